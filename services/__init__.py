@@ -1,0 +1,1 @@
+"""A smart apartment, its camera and a robot on one MQTT event bus."""

@@ -1,0 +1,77 @@
+"""The bus contract: what a message is, what a bus can do, and how topics match filters.
+
+Not here: the implementations, `memory.py` (in this process), `mqtt.py` (paho, any broker) and `embedded.py`
+(a broker in this process). One contract test, `tests/bus/test_contract.py`, runs against all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message, as it travels and as a service sees it.
+
+    Bus topics never begin with `/`; locally posted ones (`/camera/reply`) do, and carry `value`, any object that
+    nobody changes any more, instead of a payload. `received` is the receiver's clock in seconds at arrival.
+    `reply_to` and `correlation` are MQTT 5's response topic and correlation data, where the client sent them.
+    """
+
+    topic: str
+    payload: bytes = b""
+    retain: bool = False
+    qos: int = 1
+    received: float = 0.0
+    value: object = None
+    reply_to: str | None = None
+    correlation: bytes | None = None
+    expires_s: int | None = None  # MQTT 5 message expiry; None: never
+    token: object = None  # what the bus needs to acknowledge this one
+
+
+class Bus(Protocol):
+    """The one contract of every bus. All calls come from the service's main thread but `post`, which any may use.
+
+    States (`retain`) are remembered and published again after every reconnect. While there is no connection
+    events wait in a bounded queue (the oldest goes first when it is full, counted in `dropped`), and commands,
+    which have an expiry, are dropped and counted: a late command is worse than none.
+    """
+
+    connected: bool
+    connections: int
+    dropped: int
+
+    def subscribe(self, filters: Sequence[str]) -> None:
+        """Asks for everything that matches; restored after every reconnect."""
+
+    def publish(self, message: Message) -> None:
+        """Sends without waiting."""
+
+    def post(self, message: Message) -> None:
+        """Puts a local message (topic begins with `/`) into the inbox, from any thread."""
+
+    def receive(self, timeout: float | None) -> list[Message]:
+        """All that waits, in the order of arrival, at most a window; waits up to `timeout` s (None: for ever) for the first."""
+
+    def ack(self, messages: Iterable[Message]) -> None:
+        """Acknowledges; what came by an older connection is left to the broker, which sends it again."""
+
+    def close(self) -> None:
+        """Sends what is still to be sent, says `offline`, and leaves."""
+
+
+def topic_matches(topic_filter: str, topic: str) -> bool:
+    """Whether an MQTT filter (`+` one level, a last `#` any rest) matches a topic (MQTT 5, section 4.7)."""
+    wanted = topic_filter.split("/")
+    levels = topic.split("/")
+    if topic.startswith("$") and wanted[0] in ("+", "#"):
+        return False
+    for index, level in enumerate(wanted):
+        if level == "#":
+            return True
+        if index >= len(levels) or level not in ("+", levels[index]):
+            return False
+    return len(wanted) == len(levels)

@@ -1,0 +1,116 @@
+"""The model of the home: rooms, things and items, as `config/home.yaml` describes them.
+
+Everything that concerns an item comes from here: topics, persistence, bridge, simulators, OpenHAB's files.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from services.section import Section
+from services.states import ITEM_TYPES, base_type
+
+NAME = r"^[A-Za-z_][A-Za-z0-9_]*$"
+GROUP_ROS = "ROS"  # the group whose members go to the robot, as in the report
+
+
+class Range(Section):
+    """What a number may be, in the item's unit."""
+
+    min: float
+    max: float
+    step: float | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def is_a_range(self) -> Range:
+        if self.min >= self.max:
+            raise ValueError(f"expected min below max, got {self.min} and {self.max}")
+        return self
+
+
+class Room(Section):
+    """A room; its walls are in `world.yaml`, its name here is what people read."""
+
+    label: str
+
+
+class Thing(Section):
+    """A device; its items are what can be seen and steered of it."""
+
+    label: str
+    room: str | None = None
+    kind: Literal["zwave", "mqtt", "virtual"] = "zwave"
+
+
+class Item(Section):
+    """One item of OpenHAB. `unit` is OpenHAB's symbol, `range` is in that unit."""
+
+    type: str
+    label: str
+    thing: str | None = None
+    room: str | None = None
+    groups: tuple[str, ...] = ()
+    unit: str | None = None
+    icon: str | None = None
+    range: Range | None = None
+    options: dict[str, str] = {}  # state -> what people read
+    read_only: bool = False
+    ros: bool = True  # member of group ROS: on the robot's topics
+    persist: tuple[str, ...] = ("everyChange", "restoreOnStartup")  # empty: never stored
+
+    @field_validator("type")
+    @classmethod
+    def is_an_item_type(cls, text: str) -> str:
+        if base_type(text) not in ITEM_TYPES:
+            raise ValueError(f"expected one of {', '.join(ITEM_TYPES)} (or Number:<dimension>), got {text!r}")
+        return text
+
+    @property
+    def takes_commands(self) -> bool:
+        """Whether a robot may command it at all."""
+        return not self.read_only and base_type(self.type) not in ("Contact", "Call", "Image")
+
+
+class Home(Section):
+    """The whole home; names are OpenHAB item names and so the topics' `<item>`."""
+
+    rooms: dict[str, Room] = {}
+    things: dict[str, Thing] = {}
+    groups: dict[str, str] = {}  # name -> label
+    items: dict[str, Item]
+
+    def faults(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """What refers to nothing: where (keys from the top of the file), and what is wrong."""
+        for name, thing in self.things.items():
+            if thing.room is not None and thing.room not in self.rooms:
+                yield ("things", name, "room"), f"expected one of the rooms, got {thing.room!r}"
+        for name, item in self.items.items():
+            yield from self._item_faults(name, item)
+
+    def _item_faults(self, name: str, item: Item) -> Iterator[tuple[tuple[str, ...], str]]:
+        if not re.match(NAME, name):
+            yield ("items", name), "expected a name of letters, digits and _ that does not begin with a digit"
+        if item.thing is not None and item.thing not in self.things:
+            yield ("items", name, "thing"), f"expected one of the things, got {item.thing!r}"
+        if item.room is not None and item.room not in self.rooms:
+            yield ("items", name, "room"), f"expected one of the rooms, got {item.room!r}"
+        for group in item.groups:
+            if group not in self.groups and group != GROUP_ROS:
+                yield ("items", name, "groups"), f"expected one of the groups, got {group!r}"
+
+    @cached_property
+    def ros_items(self) -> dict[str, Item]:
+        """The members of group ROS."""
+        return {name: item for name, item in self.items.items() if item.ros}
+
+    def room_of(self, name: str) -> str | None:
+        """The room of an item: its own, else its thing's."""
+        item = self.items[name]
+        if item.room is not None or item.thing is None:
+            return item.room
+        return self.things[item.thing].room

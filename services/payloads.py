@@ -1,0 +1,210 @@
+"""The payloads that travel as JSON: one frozen model each. Which topic carries which is in `topics.py`.
+
+Times are ISO 8601 in UTC with milliseconds and `Z`; angles are degrees as the camera reads them; lengths metres.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, RootModel, field_validator, model_validator
+
+OrderState = Literal["accepted", "running", "done", "failed", "refused", "cancelled"]
+Who = Literal["human", "mission", "scan"]
+Number = Field(allow_inf_nan=False)
+
+
+def stamp(seconds: float) -> str:
+    """Seconds since 1970 as the text that our payloads carry, `2026-01-31T07:05:00.123Z`."""
+    text = datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds")
+    return text.replace("+00:00", "Z")
+
+
+def seconds(text: str) -> float:
+    """The reverse of `stamp`; any ISO 8601 text with an offset. ValueError when it is not one."""
+    return datetime.fromisoformat(text).timestamp()
+
+
+class Payload(BaseModel):
+    """The base of all: frozen, and a key that nobody knows is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class ServiceInfo(Payload):
+    """`service/<service>/info`: what runs, since when, and what it has counted."""
+
+    version: str
+    started: str
+    counters: dict[str, float] = {}
+    aside: list[str] = []  # files of messages that crashed the service twice
+
+
+class Diagnostic(Payload):
+    """`diagnostics/<component>`: levels as in diagnostic_msgs/DiagnosticStatus, 0 OK, 1 WARN, 2 ERROR, 3 STALE."""
+
+    level: int = Field(ge=0, le=3)
+    message: str
+    values: dict[str, str] = {}
+    hardware_id: str = ""
+
+
+class CameraStatus(Payload):
+    """`camera/<cam>/status`."""
+
+    state: Literal["online", "offline", "bad_login", "locked", "rebooting", "degraded"]
+    reason: str = ""
+
+
+class Order(Payload):
+    """`camera/<cam>/order/<Key>`: the value, and whose order it is; plain text is a human's.
+
+    A JSON object without a `value` is itself the value (`{"targets": [582]}` for Scan).
+    """
+
+    value: Any = ""
+    id: str | None = Field(default=None, max_length=64)
+    by: Who = "human"
+
+    @model_validator(mode="before")
+    @classmethod
+    def bare_object_is_the_value(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "value" not in data:
+            return {"value": data}
+        return data
+
+
+class Position(Payload):
+    """`camera/<cam>/position`: readings in degrees, zoom as a level; `place` when one is under the lens."""
+
+    pan: float
+    tilt: float
+    zoom: float
+    moving: bool = False
+    place: str | None = None
+
+
+class PositionSet(Payload):
+    """`camera/<cam>/position/set`: what is left out stays."""
+
+    pan: float | None = None
+    tilt: float | None = None
+    zoom: float | None = None
+    id: str | None = Field(default=None, max_length=64)
+    by: Who = "human"
+
+    @model_validator(mode="after")
+    def names_an_axis(self) -> Self:
+        if self.pan is None and self.tilt is None and self.zoom is None:
+            raise ValueError("expected at least one of pan, tilt, zoom")
+        return self
+
+
+class OrderResult(Payload):
+    """`camera/<cam>/order_result`: one step in the life of an order."""
+
+    id: str
+    key: str
+    value: Any
+    state: OrderState
+    error: str | None = None
+    position: Position | None = None
+    clamped: bool = False
+
+
+class Place(Payload):
+    """One named place: readings, and the camera's own preset where it has one."""
+
+    pan: float
+    tilt: float
+    zoom: float = 0.0
+    preset: int | None = None
+
+
+class Places(RootModel[dict[str, Place]]):
+    """`camera/<cam>/places`."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+class Motion(Payload):
+    """`camera/<cam>/motion`: 1 for 15 s after motion, 0 otherwise, -1 when the alarm is in trouble."""
+
+    value: Literal[0, 1, -1]
+    since: str
+
+
+class ScanState(Payload):
+    """`camera/<cam>/scan/state`: `progress` goes from 0 to 1."""
+
+    state: Literal["idle", "running", "done", "cancelled", "failed"]
+    scan: str | None = None
+    targets: list[int] = []
+    found: list[int] = []
+    turn: int = 0
+    place: str | None = None
+    progress: float = Field(default=0.0, ge=0.0, le=1.0)
+    frames_taken: int = 0
+    frames_analysed: int = 0
+    elapsed_s: float = 0.0
+    reason: str = ""
+
+
+class Point(Payload):
+    """Metres, in the frame that the message names."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Quaternion(Payload):
+    """A unit quaternion."""
+
+    x: float
+    y: float
+    z: float
+    w: float
+
+
+class WeightedQuaternion(Quaternion):
+    """One of several orientations that are possible; the weights of one list add up to 1."""
+
+    weight: float
+
+
+class ScanResult(Payload):
+    """`camera/<cam>/scan/result`: one marker, where it is in the apartment, and how sure that is."""
+
+    camera: str
+    marker: int
+    dictionary: str
+    place: str
+    position: Point | None
+    why: str | None = None
+    covariance: list[list[float]] | None = None
+    orientation: Quaternion | None = None
+    orientations: list[WeightedQuaternion] = []
+    frame: str = "apartment"
+    distance: float | None = None
+    zoom: float = 0.0
+    frames: int = Field(default=1, ge=0)
+    mode: str = "color"
+    first_seen: str
+    stamp: str
+    scan: str
+
+    @field_validator("first_seen", "stamp")
+    @classmethod
+    def is_a_time(cls, text: str) -> str:
+        seconds(text)
+        return text
+
+
+class Stream(Payload):
+    """`camera/<cam>/stream`: which streams are on, and where the picture can be had without a password."""
+
+    rtsp: bool
+    mjpeg: bool
+    url: str

@@ -1,0 +1,1 @@
+"""Fixtures for a lab's own tests."""
