@@ -21,7 +21,8 @@ from typing import Any
 
 from services.aside import Aside
 from services.bus import WAKE_TOPIC, Message
-from services.bus.mqtt import Address, MqttBus
+from services.bus.connection import Address
+from services.bus.mqtt import MqttBus
 from services.config import Apartment, BusSettings, Instance, Tls
 from services.runner import Runner
 from services.topics import SERVICE_STATUS
