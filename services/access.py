@@ -14,17 +14,15 @@ from pathlib import Path
 from services.registry import REGISTRY
 from services.topics import TABLE, Topic
 
-PEOPLE = ("operator", "openhab", "robot")  # accounts of no process of ours
-PLANNED = ("history", "mission", "dashboard")  # accounts that the table names already
+PLAYS = {row.name: row.plays for row in REGISTRY if row.plays}
 ITERATIONS = 101  # of PBKDF2, as mosquitto_passwd of Debian 12 writes
 
 
 def accounts(cameras: Iterable[str]) -> list[str]:
-    """Every account that a broker of ours knows, sorted."""
-    own = {row.account for row in REGISTRY if row.on_bus and "<cam>" not in row.account}
-    return sorted(
-        {*own, *PEOPLE, *(role for row in TABLE for role in (*row.writers, *row.readers) if "<" not in role)}
-    ) + [f"camera-{camera}" for camera in cameras]
+    """Every account that a broker of ours knows: services, roles of the table, one per camera."""
+    own = {row.name for row in REGISTRY if row.on_bus and "<cam>" not in row.name}
+    roles = {role for row in TABLE for role in (*row.writers, *row.readers) if "<" not in role}
+    return [*sorted(own | roles), *(f"camera-{camera}" for camera in cameras)]
 
 
 def acl(cameras: Iterable[str], *, anonymous: str | None = None) -> str:
@@ -64,7 +62,9 @@ def _add(rows: dict[str, str], account: str, topic: Topic, *, writes: bool, read
 
 
 def _may(account: str, roles: tuple[str, ...]) -> bool:
-    return account in roles or (account.startswith("camera-") and "camera-<cam>" in roles)
+    return (
+        account in roles or PLAYS.get(account) in roles or (account.startswith("camera-") and "camera-<cam>" in roles)
+    )
 
 
 def password_line(account: str, password: str) -> str:

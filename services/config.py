@@ -66,12 +66,6 @@ class Apartment:
     cameras: tuple[str, ...]
     instances: dict[str, Instance] = field(default_factory=dict)
 
-    def account(self, instance: Instance) -> tuple[str | None, SecretStr | None]:
-        """User and password of a service at the broker."""
-        user = instance.row.account.replace("<cam>", instance.name.removeprefix("camera-"))
-        password = self.bus.accounts.get(user)
-        return (user, password) if password is not None else (None, None)
-
 
 class Top(Section):
     """The keys at the top of the file that belong to no service."""
