@@ -25,15 +25,16 @@ def accounts(cameras: Iterable[str]) -> list[str]:
     return [*sorted(own | roles), *(f"camera-{camera}" for camera in cameras)]
 
 
-def acl(cameras: Iterable[str], *, anonymous: str | None = None) -> str:
+def acl(cameras: Iterable[str], *, anonymous: bool = False) -> str:
     """mosquitto's acl_file: what each account may write and read.
 
-    `anonymous` is the account whose rights a client without a name has; the demo's, on loopback, the operator's.
+    `anonymous`: a client without a name may do everything. For the demo and for tests on loopback, where a newcomer
+    plays the home, the robot and the operator in turn; an installation has no such clients.
     """
     cameras = list(cameras)
     lines = ["# Written by `apartment topics --acl` from services/topics.py; a test keeps them equal.", ""]
-    if anonymous is not None:
-        lines += ["# whoever gives no name", *_rights(anonymous, cameras), ""]
+    if anonymous:
+        lines += ["# whoever gives no name", "topic readwrite #", ""]
     for account in accounts(cameras):
         lines += [f"user {account}", *_rights(account, cameras), ""]
     return "\n".join(lines)
@@ -78,7 +79,11 @@ def password_line(account: str, password: str) -> str:
 
 
 def write_passwords(file: Path, passwords: Mapping[str, str]) -> None:
-    """Writes the password file, for nobody else to read."""
-    text = "".join(f"{password_line(account, password)}\n" for account, password in passwords.items())
+    """Writes mosquitto's password file, for nobody else to read."""
+    write_private(file, "".join(f"{password_line(account, password)}\n" for account, password in passwords.items()))
+
+
+def write_private(file: Path, text: str) -> None:
+    """Writes a file with mode 0600 from its first byte on."""
     with open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w", encoding="utf-8") as output:
         output.write(text)

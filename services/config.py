@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -76,9 +76,9 @@ class Top(Section):
     default_camera: str | None = None
 
 
-def load(file: Path, only: tuple[str, ...] | None = None) -> Apartment:
+def load(file: Path, only: tuple[str, ...] | None = None, environment: Mapping[str, str] = os.environ) -> Apartment:
     """Reads and checks; ConfigError with every fault. `only`: the services to run; the others' secrets may be absent."""
-    secret = secret_store.lookup()
+    secret = secret_store.lookup(environment)
     source = document.read(file, secret)
     raw = source.value if isinstance(source.value, dict) else {}
     if not source.faults and not raw:
@@ -93,7 +93,7 @@ def load(file: Path, only: tuple[str, ...] | None = None) -> Apartment:
     if faults or top is None or home is None:
         raise ConfigError(sorted(dict.fromkeys(faults), key=_by_place))
     by_name = {instance.name: instance for instance in instances}
-    return Apartment(file, top.bus, home, _state_folder(top, file), cameras, by_name)
+    return Apartment(file, top.bus, home, _state_folder(top, file, environment), cameras, by_name)
 
 
 def _by_place(fault: str) -> tuple[str, int]:
@@ -121,12 +121,12 @@ def _wanted(faults: list[str], only: tuple[str, ...] | None) -> list[str]:
     return [fault for fault in faults if matters(fault)]
 
 
-def _state_folder(top: Top, file: Path) -> Path:
+def _state_folder(top: Top, file: Path, environment: Mapping[str, str]) -> Path:
     if top.state is not None:
         return file.parent / top.state
-    if "STATE_DIRECTORY" in os.environ:
-        return Path(os.environ["STATE_DIRECTORY"].split(":")[0])
-    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "apartment"
+    if "STATE_DIRECTORY" in environment:
+        return Path(environment["STATE_DIRECTORY"].split(":")[0])
+    return Path(environment.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "apartment"
 
 
 def _home(file: Path) -> tuple[Home | None, list[str]]:

@@ -32,11 +32,28 @@ class Row:
 
 
 REGISTRY: tuple[Row, ...] = (
-    Row("simulated-camera", "services.simulators.camera", ("simulators", "camera"),
-        "a camera on the network that is not there", on_bus=False),
-    Row("simulated-home", "services.simulators.home", ("simulators", "home"),
-        "lights, doors and sensors that answer as OpenHAB would", plays="openhab"),
-    Row("persistence", "services.persistence", ("persistence",), "writes what happens to the database", durable=True, protocol=4),
+    Row(
+        "simulated-camera",
+        "services.simulators.camera",
+        ("simulators", "camera"),
+        "a camera on the network that is not there",
+        on_bus=False,
+    ),
+    Row(
+        "simulated-home",
+        "services.simulators.home",
+        ("simulators", "home"),
+        "lights, doors and sensors that answer as OpenHAB would",
+        plays="openhab",
+    ),
+    Row(
+        "persistence",
+        "services.persistence",
+        ("persistence",),
+        "writes what happens to the database",
+        durable=True,
+        protocol=4,
+    ),
     Row("camera-<cam>", "services.camera", ("cameras", "<cam>"), "drives one camera: places, orders, scans"),
     Row("bridge", "services.bridge", ("bridge",), "maps the bus to ROS 1 topics and back"),
-)  # fmt: skip
+)

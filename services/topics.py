@@ -127,16 +127,25 @@ SHOWN = ("bridge", "persistence", "history", "mission", "dashboard", "operator")
 STEERS = ("bridge", "dashboard", "operator", "mission")
 
 HOME_STATE = Topic(
-    "home/<item>/state", Kind.STATE, str, ("openhab", "persistence"), (*SHOWN, "camera-<cam>"),
-    "the state of an item in OpenHAB's string form (`ON`, `21.5 °C`, `UNDEF`)", stored=True,
-)  # fmt: skip
+    "home/<item>/state",
+    Kind.STATE,
+    str,
+    ("openhab", "persistence"),
+    (*SHOWN, "camera-<cam>"),
+    "the state of an item in OpenHAB's string form (`ON`, `21.5 °C`, `UNDEF`)",
+    stored=True,
+)
 HOME_COMMAND = Topic(
-    "home/<item>/command", Kind.COMMAND, str, (*STEERS, "camera-<cam>"), ("openhab", "dashboard", "operator"),
+    "home/<item>/command",
+    Kind.COMMAND,
+    str,
+    (*STEERS, "camera-<cam>"),
+    ("openhab", "dashboard", "operator"),
     "sendCommand",
-)  # fmt: skip
+)
 HOME_SET = Topic(
     "home/<item>/set", Kind.COMMAND, str, (*STEERS, "camera-<cam>"), ("openhab", "dashboard", "operator"), "postUpdate"
-)  # fmt: skip
+)
 SERVICE_STATUS = Topic(
     "service/<service>/status",
     Kind.STATE,
@@ -149,40 +158,91 @@ SERVICE_INFO = Topic(
     "service/<service>/info", Kind.STATE, p.ServiceInfo, ("<service>",), SHOWN, "version, start and counters"
 )
 CAMERA_STATUS = Topic(
-    "camera/<cam>/status", Kind.STATE, p.CameraStatus, ("camera-<cam>",), SHOWN, "whether the camera can be used, and why not"
-)  # fmt: skip
+    "camera/<cam>/status",
+    Kind.STATE,
+    p.CameraStatus,
+    ("camera-<cam>",),
+    SHOWN,
+    "whether the camera can be used, and why not",
+)
 CAMERA_ORDER = Topic(
-    "camera/<cam>/order/<key>", Kind.COMMAND, p.Order, (*STEERS, "openhab"), ("camera-<cam>",),
+    "camera/<cam>/order/<key>",
+    Kind.COMMAND,
+    p.Order,
+    (*STEERS, "openhab"),
+    ("camera-<cam>",),
     "an order: plain text is the value and a human's, or JSON with `value`, `id`, `by`",
-)  # fmt: skip
+)
 CAMERA_ORDER_RESULT = Topic(
-    "camera/<cam>/order_result", Kind.EVENT, p.OrderResult, ("camera-<cam>",), (*SHOWN, "openhab"),
-    "what became of an order; also to the MQTT 5 response topic", stored=True,
-)  # fmt: skip
+    "camera/<cam>/order_result",
+    Kind.EVENT,
+    p.OrderResult,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "what became of an order; also to the MQTT 5 response topic",
+    stored=True,
+)
 CAMERA_POSITION = Topic(
-    "camera/<cam>/position", Kind.STATE, p.Position, ("camera-<cam>",), (*SHOWN, "openhab"), "where the camera looks, degrees as it reads them"
-)  # fmt: skip
+    "camera/<cam>/position",
+    Kind.STATE,
+    p.Position,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "where the camera looks, degrees as it reads them",
+)
 CAMERA_POSITION_SET = Topic(
-    "camera/<cam>/position/set", Kind.COMMAND, p.PositionSet, (*STEERS, "openhab"), ("camera-<cam>",), "look there; answered like an order, key `Position`"
-)  # fmt: skip
+    "camera/<cam>/position/set",
+    Kind.COMMAND,
+    p.PositionSet,
+    (*STEERS, "openhab"),
+    ("camera-<cam>",),
+    "look there; answered like an order, key `Position`",
+)
 CAMERA_PLACES = Topic(
     "camera/<cam>/places", Kind.STATE, p.Places, ("camera-<cam>",), (*SHOWN, "openhab"), "the named places"
 )
 CAMERA_MOTION = Topic(
-    "camera/<cam>/motion", Kind.STATE, p.Motion, ("camera-<cam>",), (*SHOWN, "openhab"), "1 for 15 s after motion, -1 when the alarm is in trouble"
-)  # fmt: skip
+    "camera/<cam>/motion",
+    Kind.STATE,
+    p.Motion,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "1 for 15 s after motion, -1 when the alarm is in trouble",
+)
 CAMERA_SCAN_STATE = Topic(
-    "camera/<cam>/scan/state", Kind.STATE, p.ScanState, ("camera-<cam>",), (*SHOWN, "openhab"), "how far a scan is", stored=True
-)  # fmt: skip
+    "camera/<cam>/scan/state",
+    Kind.STATE,
+    p.ScanState,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "how far a scan is",
+    stored=True,
+)
 CAMERA_SCAN_RESULT = Topic(
-    "camera/<cam>/scan/result", Kind.EVENT, p.ScanResult, ("camera-<cam>",), (*SHOWN, "openhab"), "a marker and where it is", stored=True
-)  # fmt: skip
+    "camera/<cam>/scan/result",
+    Kind.EVENT,
+    p.ScanResult,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "a marker and where it is",
+    stored=True,
+)
 CAMERA_MARKER = Topic(
-    "camera/<cam>/marker/<marker>", Kind.STATE, p.ScanResult, ("camera-<cam>",), (*SHOWN, "openhab"), "the newest scan result of that marker"
-)  # fmt: skip
+    "camera/<cam>/marker/<marker>",
+    Kind.STATE,
+    p.ScanResult,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "the newest scan result of that marker",
+)
 CAMERA_SCAN_IMAGE = Topic(
-    "camera/<cam>/scan/image", Kind.BLOB, bytes, ("camera-<cam>",), SHOWN, "an analysed frame as JPEG with the markers drawn, while ScanImgPub is on"
-)  # fmt: skip
+    "camera/<cam>/scan/image",
+    Kind.BLOB,
+    bytes,
+    ("camera-<cam>",),
+    SHOWN,
+    "an analysed frame as JPEG with the markers drawn, while ScanImgPub is on",
+)
 CAMERA_SNAPSHOT_GET = Topic(
     "camera/<cam>/snapshot/get",
     Kind.COMMAND,
@@ -193,11 +253,22 @@ CAMERA_SNAPSHOT_GET = Topic(
 )
 CAMERA_SNAPSHOT = Topic("camera/<cam>/snapshot", Kind.BLOB, bytes, ("camera-<cam>",), SHOWN, "a JPEG")
 CAMERA_STREAM = Topic(
-    "camera/<cam>/stream", Kind.STATE, p.Stream, ("camera-<cam>",), SHOWN, "which streams are on, and the address of ours"
-)  # fmt: skip
+    "camera/<cam>/stream",
+    Kind.STATE,
+    p.Stream,
+    ("camera-<cam>",),
+    SHOWN,
+    "which streams are on, and the address of ours",
+)
 DIAGNOSTICS = Topic(
-    "diagnostics/<component>", Kind.STATE, p.Diagnostic, ALL, SHOWN, "health of a component, about once a second", stored=True
-)  # fmt: skip
+    "diagnostics/<component>",
+    Kind.STATE,
+    p.Diagnostic,
+    ALL,
+    SHOWN,
+    "health of a component, about once a second",
+    stored=True,
+)
 
 TABLE: tuple[Topic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
 

@@ -101,7 +101,7 @@ def make_kit(kind: str, folder: Path) -> Kit:
         made = BrokerKit(embedded.broker)
         made.keeps_retained = False
         return made
-    return BrokerKit(lambda port: mosquitto.private(folder, port=port, anonymous="operator"))
+    return BrokerKit(lambda port: mosquitto.private(folder, port=port, anonymous=True))
 
 
 def until(condition: Callable[[], Any], *buses: Any) -> Any:
