@@ -63,7 +63,7 @@ class Item(Section):
     unit: str | None = None
     icon: str | None = None
     range: Range | None = None
-    options: dict[str, str] = {}  # state -> what people read
+    options: dict[str, str] = Field(default={})  # state -> what people read
     read_only: bool = False
     autoupdate: bool = True  # OpenHAB takes a command for the new state at once; else only the device's report counts
     ros: bool = True  # member of group ROS: on the robot's topics
@@ -86,9 +86,9 @@ class Home(Section):
     """The whole home; names are OpenHAB item names and so the topics' `<item>`."""
 
     timezone: str = "UTC"  # of the IANA database, such as Europe/Madrid: the clock on the wall
-    rooms: dict[str, Room] = {}
-    things: dict[str, Thing] = {}
-    groups: dict[str, str] = {}  # name -> label
+    rooms: dict[str, Room] = Field(default={})
+    things: dict[str, Thing] = Field(default={})
+    groups: dict[str, str] = Field(default={})  # name -> label
     items: dict[str, Item]
 
     @field_validator("timezone")

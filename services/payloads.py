@@ -39,7 +39,9 @@ def _finite(value: Any) -> Any:
     return value
 
 
-Free = Annotated[Any, AfterValidator(_finite)]  # whatever JSON can say; pydantic's parser lets NaN and 1e999 into an Any
+Free = Annotated[
+    Any, AfterValidator(_finite)
+]  # whatever JSON can say; pydantic's parser lets NaN and 1e999 into an Any
 
 
 class Payload(BaseModel):

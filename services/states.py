@@ -44,7 +44,7 @@ ITEM_TYPES = (
 )
 MILLIS_FROM_DIGITS = 12  # an epoch with fewer digits is in seconds, as DateTimeType reads it
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-# A unit begins with a letter or a sign such as % or °, never with a digit or a comma: `1.2.3` and `21,5` are no numbers.
+# A unit begins with a letter or a sign such as % or °, not with a digit or a comma: `1.2.3` and `21,5` are no numbers.
 _QUANTITY = re.compile(rf"({_NUMBER.pattern})(?: ?([^\W\d_]\S*|[%°′″'\"]\S*))?")
 _DATE = r"[0-9]{4}-[0-9]{2}-[0-9]{2}"
 _TIME = r"[0-9]{2}:[0-9]{2}(?::[0-9]{2}(?:\.[0-9]{1,9})?)?"

@@ -14,7 +14,7 @@ LONGEST_STEP_BACK_S = 60.0  # more is a clock that was set back
 
 
 class Agenda:
-    """Actions by their time. The simulation's time is the clock's at the first `run`, and `speed` times as fast after."""
+    """Actions by their time. The simulation's time starts as the clock's and runs `speed` times as fast."""
 
     def __init__(self, speed: float = 1.0) -> None:
         self._speed = speed
@@ -35,10 +35,10 @@ class Agenda:
         self._count += 1
 
     def run(self, now: float) -> None:
-        """Runs what is due, each action at its own time, so that the result does not depend on how often this is called."""
+        """Runs what is due, each action at its own time: how often this is called makes no difference to the result."""
         time = self.time(now)
         gap = time - self._last
-        if not -LONGEST_STEP_BACK_S <= gap <= LONGEST_GAP_S * max(1.0, self._speed):
+        if not -LONGEST_STEP_BACK_S <= gap <= LONGEST_GAP_S:
             self._waiting = [(when + gap, count, action) for when, count, action in self._waiting]
         self._last = time
         while self._waiting and self._waiting[0][0] <= time:

@@ -7,7 +7,7 @@ runs with the same seed have the same day, however often they look.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache
 from math import cos, exp, pi, sin
@@ -15,11 +15,13 @@ from random import Random
 
 COMFORT_C = 20.5  # wanted in rooms without a thermostat
 FROST_C = 5.0  # held even when the heating is off
-LOWERED_K = 3.0  # how much cooler `eco` and the night are
+LOWERED_K = 2.0  # how much cooler `eco` and the night are
 TIME_CONSTANT_S = 12 * 3600.0  # a flat of the 1970s; new ones reach days
 RADIATOR_K = 36.0  # a wide open radiator lifts the room so far above outside in the long run
-VALVE_BAND_K = 0.6  # from shut to wide open
-FREE_HEAT_K = 3.0  # people, kitchen and sun
+VALVE_BAND_K = 1.5  # from shut to wide open
+AIR_CHANGE_S = 2 * 3600.0  # until most of a room's air is new
+FREE_HEAT_K = 3.0  # what people, kitchen and sun lift it by
+FREE_VAPOUR_PA = 300.0  # and what they add to the vapour outside
 NIGHT = (23, 6)  # hours on the wall clock
 PERIODS_S = (2_900.0, 11_300.0, 47_000.0)  # of `wander`; none a multiple of another, so that no two hours are alike
 
@@ -52,11 +54,13 @@ def saturation(celsius: float) -> float:
     return 611.2 * exp(17.62 * celsius / (243.12 + celsius))
 
 
-def humidity(seed: int, room: str | None, celsius: float, outdoor: float, time: float) -> float:
-    """Relative humidity in percent: the vapour of outside, and in a room what people add, at the room's temperature."""
-    vapour = (0.75 + 0.1 * wander(f"{seed}/damp", time)) * saturation(outdoor)
-    if room is not None:
-        vapour += 300.0 * (1.0 + 0.3 * wander(f"{seed}/vapour/{room}", time))
+def vapour_outside(seed: int, celsius: float, time: float) -> float:
+    """Vapour pressure outside in Pa; three quarters of what the air could hold, more or less."""
+    return (0.75 + 0.1 * wander(f"{seed}/damp", time)) * saturation(celsius)
+
+
+def relative(vapour: float, celsius: float) -> float:
+    """Relative humidity in percent, of a vapour pressure in Pa; within what sensors can tell."""
     return min(98.0, max(5.0, 100.0 * vapour / saturation(celsius)))
 
 
@@ -74,10 +78,13 @@ class Room:
     """The air of one room; `key` (seed and name) makes its own draughts."""
 
     key: str
-    celsius: float = field(default=COMFORT_C)
+    celsius: float
+    vapour: float  # Pa
 
-    def step(self, seconds: float, outdoor: float, setpoint: float, time: float) -> None:
-        """Lets time go by: exact for the radiator's valve as it is at the beginning."""
+    def step(self, seconds: float, outdoor: float, damp: float, setpoint: float, time: float) -> None:
+        """Lets time go by under a weather of `outdoor` °C and `damp` Pa; exact while weather and valve stay."""
         valve = min(1.0, max(0.0, 0.5 + (setpoint - self.celsius) / VALVE_BAND_K))
-        end = outdoor + FREE_HEAT_K * (1.0 + 0.5 * wander(self.key, time)) + RADIATOR_K * valve
+        busy = 1.0 + wander(self.key, time)  # people, cooking, showers
+        end = outdoor + FREE_HEAT_K * busy + RADIATOR_K * valve
         self.celsius += (end - self.celsius) * (1.0 - exp(-seconds / TIME_CONSTANT_S))
+        self.vapour += (damp + FREE_VAPOUR_PA * busy - self.vapour) * (1.0 - exp(-seconds / AIR_CHANGE_S))

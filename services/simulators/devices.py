@@ -37,7 +37,7 @@ def unit_of(item: Item) -> str:
 
 
 def convert(value: float, unit: str, wanted: str) -> float:
-    """A value in another unit; without a unit it is in the wanted one already. BadMessage when they do not go together."""
+    """A value in another unit; without a unit it is in the wanted one already. BadMessage when the two do not fit."""
     if unit in ("", wanted):
         return value
     if unit not in UNITS or wanted not in UNITS or UNITS[unit][0] != UNITS[wanted][0]:
@@ -61,7 +61,7 @@ def _kept_color(state: str, text: str) -> str:
     if "," in text:
         hue, saturation, brightness = color(text)
     else:
-        brightness = {"ON": 100.0, "OFF": 0.0}.get(text) if text in ("ON", "OFF") else percent(text)
+        brightness = percent({"ON": "100", "OFF": "0"}.get(text, text))
     return ",".join(plain(part) for part in (hue, saturation, brightness))
 
 
