@@ -310,7 +310,7 @@ def _payload(row: Topic, message: Message) -> Any:
         return p.Order(value=text)
     assert issubclass(row.payload, BaseModel)
     try:
-        return row.payload.model_validate_json(text)
+        return row.payload.model_validate_json(text, strict=True)
     except ValidationError as error:
         raise BadMessage(f"{message.topic}: {_first_fault(error)}") from error
 
