@@ -77,7 +77,7 @@ class Top(Section):
 
 
 def load(file: Path, only: tuple[str, ...] | None = None, environment: Mapping[str, str] = os.environ) -> Apartment:
-    """Reads and checks; ConfigError with every fault. `only`: the services to run; the others' secrets may be absent."""
+    """Reads and checks; ConfigError with every fault. `only`: services to run; the others' secrets may be absent."""
     secret = secret_store.lookup(environment)
     source = document.read(file, secret)
     raw = source.value if isinstance(source.value, dict) else {}

@@ -14,7 +14,8 @@ from services import topics
 from services.bus import Message, topic_matches
 from services.errors import BadMessage
 from services.payloads import Diagnostic, Order, PositionSet
-from services.topics import BLOB_LIMIT, LEVELS, STALE_AFTER_S, TABLE, TEXT_LIMIT, Kind, Topic, find, read
+from services.topic import LEVELS, STALE_AFTER_S, Kind, Topic
+from services.topics import BLOB_LIMIT, TABLE, TEXT_LIMIT, find, read
 
 NOW = 1_769_839_500.0
 ROWS = [pytest.param(row, id=row.pattern) for row in TABLE]
