@@ -27,9 +27,17 @@ USUAL_BROKER_PORT = 1883
 class Parts:
     """What the demo meets: `used` by part, and how to get what is missing."""
 
+    folder: Path
     environment: dict[str, str] = field(default_factory=dict)
     used: list[tuple[str, str, str]] = field(default_factory=list)
-    ros: bool = False
+    database: mariadb.Server | None = None
+    ros: ros.Master | None = None
+    broker: ExitStack = field(default_factory=ExitStack)
+
+    @property
+    def broker_port(self) -> int:
+        """Where the broker listens."""
+        return int(self.environment["APARTMENT_BROKER_PORT"])
 
     def note(self, part: str, what: str, missing: Missing | None = None) -> None:
         """Adds a line to the table that people see first."""
@@ -51,13 +59,13 @@ class Simulated:
 @contextmanager
 def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
     """Starts the peers; they end with the block."""
-    parts = Parts()
+    parts = Parts(folder)
     parts.environment["APARTMENT_STATE"] = str(folder / "state")
     parts.environment["APARTMENT_CAMERA_PORT"] = str(free_port())
     parts.environment["APARTMENT_SIDE_DOOR_PORT"] = str(free_port())
     with ExitStack() as stack:
         for start in (_start_broker, _start_database, _start_ros):
-            start(folder, stack, parts, real)
+            start(stack, parts, real)
         yield parts
 
 
@@ -73,44 +81,50 @@ def services_of(folder: Path, parts: Parts, without: Collection[str] = ()) -> It
         yield Simulated(folder, config, apartment, parts, supervisor, ready)
 
 
-def _start_broker(folder: Path, stack: ExitStack, parts: Parts, real: bool) -> None:
-    port = free_port() if answers(USUAL_BROKER_PORT) else USUAL_BROKER_PORT
+def _start_broker(stack: ExitStack, parts: Parts, real: bool) -> None:
+    port = free_port() if answers(USUAL_BROKER_PORT) or not real else USUAL_BROKER_PORT
+    parts.environment["APARTMENT_BROKER_PORT"] = str(port)
+    stack.enter_context(parts.broker)
     try:
         _only_if(real, "mosquitto")
-        broker = stack.enter_context(mosquitto.private(folder / "mosquitto", port=port, anonymous=True))
+        start_mosquitto(parts)
     except Missing as missing:
-        stack.enter_context(embedded.broker(port))
+        parts.broker.enter_context(embedded.broker(port))
         parts.note("broker", f"embedded, port {port}", missing)
     else:
-        names = {account.replace("-", "_").upper(): password for account, password in broker.passwords.items()}
-        parts.environment.update({f"BUS_{account}_PASSWORD": password for account, password in names.items()})
         parts.note("broker", f"mosquitto, port {port}")
-    parts.environment["APARTMENT_BROKER_PORT"] = str(port)
 
 
-def _start_database(folder: Path, stack: ExitStack, parts: Parts, real: bool) -> None:
+def start_mosquitto(parts: Parts) -> None:
+    """Starts it, or starts it again after `parts.broker.close()`: same folder, port, accounts."""
+    broker = mosquitto.private(parts.folder / "mosquitto", port=parts.broker_port, anonymous=True)
+    for account, password in parts.broker.enter_context(broker).passwords.items():
+        parts.environment[f"BUS_{account.replace('-', '_').upper()}_PASSWORD"] = password
+
+
+def _start_database(stack: ExitStack, parts: Parts, real: bool) -> None:
     try:
         _only_if(real, "MariaDB")
-        server = stack.enter_context(mariadb.private(folder / "mariadb"))
+        server = stack.enter_context(mariadb.private(parts.folder / "mariadb"))
     except Missing as missing:
-        parts.environment["APARTMENT_DATABASE"] = f"sqlite:///{folder}/bus.db"
+        parts.environment["APARTMENT_DATABASE"] = f"sqlite:///{parts.folder}/bus.db"
         parts.note("database", "SQLite, embedded", missing)
     else:
+        parts.database = server
         parts.environment["APARTMENT_DATABASE"] = server.url
         parts.environment["APARTMENT_DATABASE_PASSWORD"] = server.password
         parts.note("database", f"MariaDB, port {server.port}")
 
 
-def _start_ros(folder: Path, stack: ExitStack, parts: Parts, real: bool) -> None:
+def _start_ros(stack: ExitStack, parts: Parts, real: bool) -> None:
     try:
         _only_if(real, "ROS")
-        master = stack.enter_context(ros.private(folder / "ros"))
+        parts.ros = stack.enter_context(ros.private(parts.folder / "ros"))
     except Missing as missing:
         parts.note("robot", "no ROS, no bridge", missing)
     else:
-        parts.environment.update(master.env)
-        parts.ros = True
-        parts.note("robot", f"ROS 1, ROS_MASTER_URI={master.uri}")
+        parts.environment.update(parts.ros.env)
+        parts.note("robot", f"ROS 1, ROS_MASTER_URI={parts.ros.uri}")
 
 
 def _only_if(real: bool, part: str) -> None:
