@@ -89,6 +89,13 @@ def moment(text: str) -> datetime:
         raise BadMessage(f"expected a time like 2026-01-31T07:05:00.000+0100, got {text[:80]!r}") from error
 
 
+def _microseconds(when: datetime) -> float:
+    try:
+        return when.timestamp() * 1e6
+    except (ValueError, OverflowError) as error:  # the first and last days of the calendar, without an offset
+        raise BadMessage(f"expected a time within the calendar, got {when.isoformat()}") from error
+
+
 def number(item_type: str, text: str) -> float | None:
     """The number of a legal state: what plots and SQL use. None for texts and for UNDEF and NULL.
 
@@ -109,7 +116,7 @@ def number(item_type: str, text: str) -> float | None:
     if kind == "Color":
         return color(text)[2]
     if kind == "DateTime":
-        return moment(text).timestamp() * 1e6
+        return _microseconds(moment(text))
     if kind == "Location":
         parts(text, 2, 3)
     return None

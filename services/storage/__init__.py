@@ -132,6 +132,11 @@ class Batch:
     def __len__(self) -> int:
         return len(self.samples) + len(self.rows)
 
+    def extend(self, other: Batch) -> None:
+        """Adds all of another batch behind this one."""
+        self.samples += other.samples
+        self.rows += other.rows
+
     def halves(self) -> tuple[Batch, Batch]:
         """The same in two, to find the one row that a database refuses."""
         s, r = (len(self.samples) + 1) // 2, len(self.rows) // 2
@@ -151,7 +156,7 @@ class Storage(Protocol):
         ...
 
     def add_items(self, items: Iterable[Item]) -> None:
-        """Makes items (and their views) that are not there; a kind that differs is changed, a missing unit filled in."""
+        """Makes items and their views; of one that is there the kind follows, and a missing unit is filled in."""
 
     def write(self, batch: Batch) -> None:
         """Writes all of it in one transaction, or nothing. Its items are known.

@@ -78,12 +78,15 @@ def _mysql(parts: SplitResult, password: str | None, view_database: str) -> Addr
     if parts.password is not None:
         faults.append("url: expected no password there; give it as `password`")
     if database == view_database:
-        faults.append(f"view_database: expected another database than {database!r}, so that a reader needs that one only")
+        faults.append(
+            f"view_database: expected another database than {database!r}, so that a reader needs that one only"
+        )
     if faults:
         raise ConfigError(faults)
     return Address(
         "mysql", host=parts.hostname or "localhost", port=_port(parts), user=unquote(parts.username or ""),
-        password=password, database=database, view_database=view_database, **options,
+        password=password, database=database, view_database=view_database,
+        socket=options.get("socket"), ssl_ca=options.get("ssl_ca"),
     )  # fmt: skip
 
 
