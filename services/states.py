@@ -137,6 +137,13 @@ def moment_text(when: datetime) -> str:
     return when.replace(tzinfo=None).isoformat(timespec="milliseconds") + f"{when:%z}"[:5]
 
 
+def _microseconds(when: datetime) -> float:
+    try:
+        return when.timestamp() * 1e6
+    except (ValueError, OverflowError) as error:  # the first and last days of the calendar, without an offset
+        raise BadMessage(f"expected a time within the calendar, got {when.isoformat()}") from error
+
+
 def number(item_type: str, text: str) -> float | None:
     """The number of a legal state: what plots and SQL use. None for texts and for UNDEF and NULL.
 
@@ -157,7 +164,7 @@ def number(item_type: str, text: str) -> float | None:
     if kind == "Color":
         return color(text)[2]
     if kind == "DateTime":
-        return moment(text).timestamp() * 1e6
+        return _microseconds(moment(text))
     if kind == "Location":
         parts(text, 2, 3)
     return None

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from services import peers
-from services.peers import mosquitto
+from services.peers import mariadb, mosquitto
+from tests.databases import Database, fresh_mariadb, fresh_sqlite
 
 NEEDED = {"mosquitto", "mariadb", "ros"}
 
@@ -32,3 +33,21 @@ def mosquitto_broker(tmp_path: Path) -> Iterator[mosquitto.Broker]:
             yield broker
     except peers.Missing as missing:
         pytest.skip(str(missing))
+
+
+@pytest.fixture(scope="session")
+def mariadb_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[mariadb.Server]:
+    """One private MariaDB for all tests."""
+    try:
+        with mariadb.private(tmp_path_factory.mktemp("mariadb")) as server:
+            yield server
+    except peers.Missing as missing:
+        pytest.skip(str(missing))
+
+
+@pytest.fixture(params=["sqlite", pytest.param("mariadb", marks=pytest.mark.mariadb)])
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Database:
+    """Each database that storage runs on, empty."""
+    if request.param == "sqlite":
+        return fresh_sqlite(tmp_path)
+    return fresh_mariadb(request.getfixturevalue("mariadb_server"))
