@@ -18,7 +18,7 @@ from services.camera.stand import GAP_S, settle, stop
 from services.errors import DeviceError
 
 TOLERANCE: Pose = (0.4, 0.4, 0.5)  # 0.5 degree promised, 0.1 is the readings' own
-JITTER_S = 0.1  # how exactly a stop can be timed over HTTP
+SLOP_S = 0.25  # a stop over HTTP can be this late: near an end the motion aims short of the goal
 SHORTEST_S = 0.15  # a wait shorter than this is worth a slower speed
 PROBE_SPEED, PROBE_S = 3, 0.2  # seen in the readings, and harmless the wrong way
 MOST_MOTIONS = 25
@@ -120,14 +120,19 @@ def _one(pose: Pose, goal: Pose, axis: int, limits: Limits, skill: Skill) -> tup
     """Speed and wait for one axis: the fastest whose wait is long enough, short of the goal where a stop is near."""
     pace = skill.paces[axis]
     distance = goal[axis] - pose[axis]
-    low, high = limits.ranges[axis]
-    room = (high - goal[axis]) if distance > 0 else (goal[axis] - low)
     for speed in reversed(pace.speeds):
-        short = max(0.0, pace.rate(speed) * JITTER_S - max(0.0, room))
+        short = _short(axis, goal[axis], distance, pace.rate(speed), limits)
         held = pace.held(speed, abs(distance) - short)
         if held >= SHORTEST_S:
             return speed, held
     return 1, max(0.0, pace.held(1, abs(distance)))
+
+
+def _short(axis: int, goal: float, distance: float, rate: float, limits: Limits) -> float:
+    """How far before the goal to aim, so that a late stop does not push against the end behind it."""
+    low, high = limits.ranges[axis]
+    room = (high - goal) if distance > 0 else (goal - low)
+    return max(0.0, rate * SLOP_S - max(0.0, room))
 
 
 def _slower(axis: int, distance: float, most: int, held: float, skill: Skill) -> int:
@@ -178,7 +183,7 @@ def _watch(
         if last is not None and now - started.received > 1.0:
             if _stands(motion, last[0], seen[0]):
                 return now, None
-            stop_at = _learn_rates(motion, goal, skill, last, seen)
+            stop_at = _learn_rates(motion, goal, limits, skill, last, seen)
         last = seen
     return max(stop_at, now), last
 
@@ -188,7 +193,7 @@ def _stands(motion: Motion, last: Pose, seen: Pose) -> bool:
 
 
 def _learn_rates(
-    motion: Motion, goal: Pose, skill: Skill, last: tuple[Pose, float], seen: tuple[Pose, float]
+    motion: Motion, goal: Pose, limits: Limits, skill: Skill, last: tuple[Pose, float], seen: tuple[Pose, float]
 ) -> float:
     """Learns the rate of each axis that turns; returns when the first of them has to be stopped."""
     stops = []
@@ -197,6 +202,7 @@ def _learn_rates(
             continue
         rate = motion.signs[axis] * (seen[0][axis] - last[0][axis]) / (seen[1] - last[1])
         left = motion.signs[axis] * (goal[axis] - seen[0][axis])
+        left -= _short(axis, goal[axis], motion.signs[axis], rate, limits)
         if rate > 0.1 * skill.paces[axis].rate(speed):
             skill.paces[axis].learn_rate(speed, rate)
             stops.append(seen[1] + left / rate - skill.lag)
