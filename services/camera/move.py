@@ -143,9 +143,7 @@ def _slower(axis: int, distance: float, most: int, held: float, skill: Skill) ->
 
 def start_of(motion: Motion, skill: Skill) -> Start:
     """The request that starts a motion."""
-    told = tuple(
-        sign * skill.senses[axis].sign if motion.speeds[axis] else 0 for axis, sign in enumerate(motion.signs)
-    )
+    told = tuple(sign * skill.senses[axis].sign if motion.speeds[axis] else 0 for axis, sign in enumerate(motion.signs))
     pan, tilt, zoom = motion.speeds
     return Start(DIRECTIONS[(told[0], told[1], told[2])], pan or tilt or zoom, tilt or None)
 

@@ -9,10 +9,12 @@ from typing import cast
 
 from services.camera.device import same
 from services.camera.plan import Plan, ask, attempt, wait
-from services.camera.requests import Direction, Reading, Reply, Start, Status, Stop
+from services.camera.requests import BadLogin, Direction, Locked, Reading, Refused, Reply, Start, Status, Stop
 from services.errors import DeviceError
 
 GAP_S = 0.25  # between two readings that are compared: the slowest speed shows in that time
+REFUSALS = 3
+LOCKED_PAUSE_S = 60.0  # a camera that takes no login takes no stop either, and each try may lock the account
 
 
 def settle(near: Reading | None = None) -> Plan[tuple[Reading, float]]:
@@ -34,19 +36,33 @@ def settle(near: Reading | None = None) -> Plan[tuple[Reading, float]]:
 
 
 def stop(now: float, *, every: bool = False) -> Plan[Reply]:
-    """Sends a stop until it is confirmed, however long that takes."""
-    pause = 0.1
+    """Sends a stop until it is confirmed, however long that takes.
+
+    A camera that refuses stops (some do when nothing runs) is looked at instead: standing still is a confirmation.
+    """
+    pause, refusals = 0.1, 0
     while True:
         reply = yield from attempt(Stop(every=every))
         if reply.error is None:
             return reply
-        yield from wait(reply.received + pause)
+        refusals += isinstance(reply.error, Refused)
+        if refusals >= REFUSALS and (yield from _stands()):
+            return reply
+        locked = isinstance(reply.error, BadLogin | Locked)
+        yield from wait(reply.received + (LOCKED_PAUSE_S if locked else pause))
         pause = min(2 * pause, 0.5)
 
 
-def halt(now: float) -> Plan[Reading]:
+def _stands() -> Plan[bool]:
+    try:
+        yield from settle()
+    except DeviceError:
+        return False
+    return True
+
+
+def halt(now: float, *, every: bool = False) -> Plan[Reading]:
     """Stops, and makes sure that it stands."""
-    every = False
     while True:
         yield from stop(now, every=every)
         try:
@@ -57,17 +73,25 @@ def halt(now: float) -> Plan[Reading]:
 
 
 class Hold:
-    """A motion by hand: until a time that can be put off while it runs."""
+    """A motion by hand for some seconds from the moment that it is confirmed; the end can be put off while it runs."""
 
-    def __init__(self, direction: Direction, speed: int, until: float) -> None:
+    def __init__(self, direction: Direction, speed: int, seconds: float) -> None:
         self.direction = direction
         self.speed = speed
-        self.until = until
+        self.seconds = seconds
+        self.until: float | None = None
+
+    def prolong(self, seconds: float, now: float) -> None:
+        """Lets it run for so long from now."""
+        self.seconds = max(self.seconds, seconds)
+        if self.until is not None:
+            self.until = max(self.until, now + seconds)
 
     def plan(self) -> Plan[Reading]:
         """Starts, waits, stops, and returns where it came to rest."""
         reply = yield from ask(Start(self.direction, self.speed, self.speed))
         now = reply.received
+        self.until = now + self.seconds
         while now < self.until:
             if self.until - now > 1.0:
                 now = (yield from ask(Status())).received

@@ -35,9 +35,8 @@ from services.camera.requests import (
     Status,
     Stop,
 )
+from services.camera.web import COMMAND, SNAPSHOT, connection, fetch
 
-COMMAND = httpx.Timeout(6.0, connect=2.0)
-SNAPSHOT = httpx.Timeout(20.0, connect=2.0)
 CODES = {
     Direction.LEFT: "Left",
     Direction.RIGHT: "Right",
@@ -133,7 +132,7 @@ def read_status(body: str) -> Reading:
     ]
     try:
         pan, tilt = float(values[0] or ""), float(values[1] or "")
-        zoom = float(values[2] or table.get("status.Zoom", 0.0))
+        zoom = float(values[2] or table.get("status.Zoom", "0"))
     except ValueError as error:
         raise Away(f"expected a position in the status, got {body[:80]!r}") from error
     return Reading(pan, tilt, zoom, _moving(table))
@@ -188,10 +187,7 @@ class Amcrest:
 
     def __init__(self, address: Address, transport: httpx.BaseTransport | None = None) -> None:
         self.login = Login(address.user, address.password)
-        limits = httpx.Limits(max_connections=1, max_keepalive_connections=1)
-        self.http = httpx.Client(
-            base_url=address.url, auth=self.login, timeout=COMMAND, limits=limits, transport=transport, trust_env=False
-        )
+        self.http = connection(address, self.login, transport)
         self.channel = address.channel
         self.running: Direction | None = None
         self._in_day_night = False  # the firmware keeps the mode in VideoInDayNight
@@ -224,28 +220,31 @@ class Amcrest:
                 return self._command(magic("reboot"))
 
     def _get(self, target: str, timeout: httpx.Timeout = COMMAND) -> httpx.Response:
-        try:
-            return check(self.http.get(target, timeout=timeout))
-        except httpx.HTTPError as error:
-            raise Away(f"no answer from the camera: {type(error).__name__} {error}".strip()) from error
+        return check(fetch(self.http, target, timeout))
 
-    def _command(self, target: str) -> None:
+    def _command(self, target: str) -> object:
         body = self._get(target).text
         if not is_ok(body):
             raise Refused(f"expected OK from the camera, got {' '.join(body.split())[:80]!r}")
+        return None
 
-    def _start(self, request: Start) -> None:
+    def _start(self, request: Start) -> object:
         channel = self._known_channel()
         self.running = request.direction
-        self._command(start(request, channel))
+        return self._command(start(request, channel))
 
-    def _stop(self, request: Stop) -> None:
+    def _stop(self, request: Stop) -> object:
         channel = self._known_channel()
-        if request.every or self.running is None:
-            for direction in Direction:
+        refused: list[Refused] = []
+        directions = [self.running] if self.running is not None and not request.every else list(Direction)
+        for direction in directions:
+            try:
                 self._command(stop(direction, channel))
-        else:
-            self._command(stop(self.running, channel))
+            except Refused as error:  # firmware that refuses to stop what does not run
+                refused.append(error)
+        if len(refused) == len(directions):
+            raise refused[0]
+        return None
 
     def _known_channel(self) -> int:
         if self.channel is None:
