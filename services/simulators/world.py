@@ -161,7 +161,7 @@ class WorldCamera(Section):
     tilt_range: XY = (-10.0, 108.0)
     serial: str = "AMC0000000000001"
     starts_at: XYZ = (0.0, 20.0, 0.0)  # pan, tilt, zoom after power-on
-    places: dict[str, Place] = {}
+    places: dict[str, Place] = Field(default_factory=dict)
 
     def aim(self, point: XYZ) -> tuple[float, float]:
         """The pan (0..360) and tilt readings at which the optical axis goes through a point of the apartment.
@@ -224,8 +224,8 @@ class World(Section):
     walls: tuple[Wall, ...]
     furniture: tuple[Furniture, ...] = ()
     markers: tuple[Marker, ...] = ()
-    cameras: dict[str, WorldCamera] = {}
-    robots: dict[str, WorldRobot] = {}
+    cameras: dict[str, WorldCamera] = Field(default_factory=dict)
+    robots: dict[str, WorldRobot] = Field(default_factory=dict)
     map: WorldMap
 
     @field_validator("furniture")

@@ -79,7 +79,9 @@ def _patch(marker: Marker, view: View) -> tuple[slice, slice] | None:
         return None
     ways, edges = sheet / sheet[:, 2:], view.rays[:: view.window.height - 1, :: view.window.width - 1]
     reach = 1.05 * np.abs(edges).max(axis=(0, 1))
-    pixels = view.window.from_sensor(project(np.column_stack([np.clip(ways[:, :2], -reach, reach), ways[:, 2]]), view.lens))
+    pixels = view.window.from_sensor(
+        project(np.column_stack([np.clip(ways[:, :2], -reach, reach), ways[:, 2]]), view.lens)
+    )
     left, top = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - PAD, 0)
     right, bottom = np.minimum(np.ceil(pixels.max(axis=0)).astype(int) + PAD, (view.window.width, view.window.height))
     return (slice(top, bottom), slice(left, right)) if left < right and top < bottom else None
@@ -90,14 +92,14 @@ def _plane(marker: Marker, view: View, rays: Array) -> Array:
     seen = marker.pose.inverse() @ view.pose
     way = np.concatenate([rays, np.ones((*rays.shape[:-1], 1))], axis=-1) @ seen.rotation.T
     start = seen.translation
-    return start[:2] - way[..., :2] * (start[2] / way[..., 2:])
+    return np.asarray(start[:2] - way[..., :2] * (start[2] / way[..., 2:]))
 
 
 def _averaged(marker: Marker, view: View, rays: Float32) -> tuple[Float32, Float32]:
     """Mean grey of the print, and the part covered by the sheet, of every pixel of a patch."""
     height, width = rays.shape[:2]
     fine = int(np.clip(np.sqrt(SAMPLES_TARGET / (height * width)), 2, 8))
-    dense = cv2.resize(rays, None, fx=fine, fy=fine, interpolation=cv2.INTER_LINEAR)
+    dense = np.asarray(cv2.resize(rays, (width * fine, height * fine), interpolation=cv2.INTER_LINEAR), np.float64)
     module = marker.size / 7
     x, y = np.moveaxis(_plane(marker, view, dense) / module, -1, 0)
     count = 7 + 2 * MARGIN

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.simulators.camera import prints
+from services.simulators.camera.looks import DENSITY
 from services.simulators.camera.optics import Float32, Window, rays
 from services.simulators.camera.prints import Image, View
-from services.simulators.camera.solids import NORMALS, SIDES, Box, boxes
-from services.simulators.camera.textures import DENSITY, floor, generator, texture
+from services.simulators.camera.solids import NORMALS, SIDES, boxes
+from services.simulators.camera.textures import floor, generator, texture
 from services.simulators.world import Lens, World
 from services.vision.frames import Array, Transform
 
@@ -24,12 +25,13 @@ NEAR_M = 0.05  # nothing nearer to the lens is drawn
 TOUCHING_M = 0.001  # boxes may overlap by this much and still count as apart: things lie on tables
 LIT_GREY = 214  # what is seen past everything: daylight
 WINDOWS = 3  # kept ready: main stream, substream, and a zoomed one
+NO_SECOND_MAP = np.empty(0, np.int16)
 FINE = 16  # cv2's polygons in sixteenths of a pixel
 
 
 @dataclass(frozen=True)
 class Surface:
-    """A textured parallelogram in the apartment: its top left, right and down edge, and its picture at halving sizes."""
+    """A textured parallelogram in the apartment: top left corner, edges right and down, its picture in sizes."""
 
     corner: Array
     right: Array
@@ -88,7 +90,7 @@ class Scene:
         how = self._bends[window]
         flat = np.full((*how.size, 3), LIT_GREY, np.uint8)
         self._draw_all(Pinhole(flat, how.matrix), pose)
-        image = np.asarray(cv2.remap(flat, how.where, None, cv2.INTER_LINEAR), np.uint8)
+        image = np.asarray(cv2.remap(flat, how.where, NO_SECOND_MAP, cv2.INTER_LINEAR), np.uint8)
         view = View(pose, self.lens, window, how.rays)
         for marker in self.world.markers:
             prints.draw(image, marker, view, self.boxes)
@@ -117,7 +119,7 @@ class Scene:
         A may come before B without harm when a side of A has B beyond it and the eye too, or a side of B has A
         beyond it and the eye not. Where neither order is harmless (they overlap), the farther one comes first.
         """
-        apart, faces = self._outside[np.ix_(chosen, range(6), chosen)], faces[chosen]
+        apart, faces = self._outside[np.ix_(chosen, np.arange(6), chosen)], faces[chosen]
         harmless = (apart & faces[:, :, None]).any(axis=1) | (apart & ~faces[:, :, None]).any(axis=1).T
         waits_for = ~harmless & harmless.T  # [a, b]: a must come after b
         left, order = np.arange(len(chosen)), []

@@ -95,7 +95,7 @@ class Box:
         near, far = -start / way, (self.extent - start) / way
         enters = np.minimum(near, far).max(axis=1)
         leaves = np.maximum(near, far).min(axis=1)
-        return (enters < leaves) & (leaves > 0.0) & (enters < 1.0)
+        return np.asarray((enters < leaves) & (leaves > 0.0) & (enters < 1.0), np.bool_)
 
 
 def boxes(world: World) -> list[Box]:
