@@ -10,7 +10,7 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 from rich.console import Console
@@ -18,7 +18,7 @@ from rich.panel import Panel
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from services import client, topics
+from services import client, persistence, topics
 from services.client import Client
 from services.config import Apartment
 from services.payloads import Order, OrderResult, ScanResult, ScanState
@@ -151,7 +151,8 @@ def _judge(out: Console, result: ScanResult, world: World) -> bool:
 def _stored(out: Console, apartment: Apartment, result: ScanResult) -> bool:
     config = apartment.instances["persistence"].config
     end = time.monotonic() + 10.0
-    with open_storage(config.url, config.password, config.view_database) as storage:  # type: ignore[attr-defined]
+    assert isinstance(config, persistence.Config)
+    with closing(open_storage(config.address)) as storage:
         while time.monotonic() < end:
             rows = [row for row in storage.sightings(result.marker, limit=10) if row.scan == result.scan]
             if rows:

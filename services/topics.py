@@ -17,6 +17,8 @@ from services.bus import Message
 from services.errors import BadMessage
 from services.topic import STALE_AFTER_S, Kind, Topic
 
+__all__ = ["BLOB_LIMIT", "TABLE", "TEXT_LIMIT", "Kind", "Read", "Topic", "find", "markdown", "read", "reply"]
+
 TEXT_LIMIT = 256 * 1024
 BLOB_LIMIT = 4 * 1024 * 1024
 

@@ -15,16 +15,18 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
-from services.simulators.world import load as load_world
 
-from services import peers, topics
+from services import peers, persistence, topics
 from services.client import Client, connected
 from services.config import BusSettings
 from services.simulated import Parts, Simulated, parts_of, services_of, start_mosquitto
+from services.simulators.world import load as load_world
+from services.storage import open_storage
 from services.supervisor import Supervisor, in_background
 
 pytestmark = [pytest.mark.mosquitto, pytest.mark.mariadb, pytest.mark.ros]
@@ -192,10 +194,9 @@ def test_a_scan_finds_the_marker_where_it_really_is_and_everyone_learns_it(flat:
 
 
 def _sighting(flat: Simulated, scan: str) -> Any:
-    from services.storage import open_storage
-
     config = flat.apartment.instances["persistence"].config
-    with open_storage(config.url, config.password, config.view_database) as storage:  # type: ignore[attr-defined]
+    assert isinstance(config, persistence.Config)
+    with closing(open_storage(config.address)) as storage:
         return next((row for row in storage.sightings(TARGET, limit=10) if row.scan == scan), None)
 
 

@@ -11,7 +11,9 @@ from services.topics import CAMERA_SCAN_RESULT, CAMERA_SCAN_STATE, DIAGNOSTICS, 
 
 HOME = Home(
     items={
-        "Lab_Temp": Item(type="Number:Temperature", label="Lab", unit="°C", persist=("everyUpdate", "restoreOnStartup")),
+        "Lab_Temp": Item(
+            type="Number:Temperature", label="Lab", unit="°C", persist=("everyUpdate", "restoreOnStartup")
+        ),
         "Kitchen_Light": Item(type="Switch", label="Light"),
         "Front_Door": Item(type="Contact", label="Door"),
         "Hall_Dimmer": Item(type="Dimmer", label="Hall"),
