@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
 
 ROUNDS = 3  # the profiles are centred on the last round's lines: what noise or a cut-off flank pulls is gone by then
 TRIM = 0.12  # of a side left out at both ends, where the other side's edge is near
@@ -22,7 +23,7 @@ OFFSET_FLOOR_PX = 0.03  # spread of edge points below which none counts as an ou
 FARTHEST_PX = 4.0  # a corner that walks farther than this from where it was found belongs to something else
 
 
-def sample(grey: Array, x: Array, y: Array) -> Array:
+def sample(grey: Picture, x: Array, y: Array) -> Array:
     """Bilinear grey values of the picture at x, y (any one shape); beyond its edge the edge's value."""
     height, width = grey.shape
     x, y = np.clip(x, 0, width - 1.001), np.clip(y, 0, height - 1.001)
@@ -36,7 +37,7 @@ def sample(grey: Array, x: Array, y: Array) -> Array:
     return values
 
 
-def refine(grey: Array, square: Array, modules: int) -> Array | None:
+def refine(grey: Picture, square: Array, modules: int) -> Array | None:
     """The corners (4, 2) of a dark square on light ground, from roughly right ones; None where the edges are not.
 
     `square` is clockwise in the picture; `modules` is the number of cells on its side, the border's included.
@@ -51,7 +52,7 @@ def refine(grey: Array, square: Array, modules: int) -> Array | None:
     return refined
 
 
-def _edge_points(grey: Array, square: Array, modules: int) -> tuple[Array, Array]:
+def _edge_points(grey: Picture, square: Array, modules: int) -> tuple[Array, Array]:
     """Where profiles across the four sides meet the edge: points (4, n, 2) and how strong it is there (4, n)."""
     along = np.roll(square, -1, axis=0) - square
     length = np.linalg.norm(along, axis=1)
