@@ -25,7 +25,7 @@ from services.section import Section
 
 M = TypeVar("M", bound=BaseModel)
 TOP = ("bus", "state", "home", "default_camera")
-INJECTED = ("name", "home", "cameras", "folder")
+INJECTED = ("name", "home", "cameras", "folder")  # see `section.py`
 
 
 class Tls(Section):
@@ -84,11 +84,11 @@ def load(file: Path, only: tuple[str, ...] | None = None, environment: Mapping[s
     if not source.faults and not raw:
         source.fault((), "expected sections such as bus, home and cameras, got nothing")
     top = _model(Top, {key: raw[key] for key in TOP if key in raw}, source, ())
-    home, home_faults = _home(file.parent / top.home) if top else (None, [])
-    cameras = _cameras(raw, source, top)
+    home, home_faults = _home(file.parent / raw["home"]) if isinstance(raw.get("home"), str) else (None, [])
+    cameras = _cameras(raw, source)
     given = {"home": home, "cameras": cameras, "folder": file.parent}
     _unknown_sections(raw, source)
-    instances = [] if home is None and top else list(_instances(raw, source, cameras, given))
+    instances = list(_instances(raw, source, cameras, given))
     faults = [*_wanted(source.faults, only), *home_faults]
     if faults or top is None or home is None:
         raise ConfigError(sorted(dict.fromkeys(faults), key=_by_place))
@@ -138,10 +138,10 @@ def _home(file: Path) -> tuple[Home | None, list[str]]:
     return home, source.faults
 
 
-def _cameras(raw: dict[str, Any], source: Document, top: Top | None) -> tuple[str, ...]:
+def _cameras(raw: dict[str, Any], source: Document) -> tuple[str, ...]:
     """The names of the cameras, the default one first."""
     names = list(raw["cameras"]) if isinstance(raw.get("cameras"), dict) else []
-    default = top.default_camera if top else None
+    default = raw.get("default_camera")
     if default is not None and default not in names:
         source.fault(
             ("default_camera",), f"expected one of the cameras ({', '.join(map(str, names))}), got {default!r}"
@@ -192,14 +192,16 @@ def _config(row: Row, settings: Any, source: Document, section: Path_, given: di
         if key in settings and key in model.model_fields:
             source.fault((*section, key), "expected no such key here, it is given by the program")
     wanted = {key: value for key, value in given.items() if key in model.model_fields and value is not None}
-    return _model(model, {**settings, **wanted}, source, section)
+    return _model(model, {**settings, **wanted}, source, section, given=INJECTED)
 
 
-def _model(model: type[M], values: Any, source: Document, path: Path_) -> M | None:
+def _model(model: type[M], values: Any, source: Document, path: Path_, given: tuple[str, ...] = ()) -> M | None:
     try:
         return model.model_validate(values)
     except ValidationError as error:
         for fault in error.errors(include_url=False):
+            if fault["loc"] in [(name,) for name in given] and fault["type"] == "missing":
+                continue  # what is given was faulty itself, and is told there
             where = (*path, *(part for part in fault["loc"] if not _is_a_tag(part)))
             source.fault(where, _expected(fault, model))
         return None
