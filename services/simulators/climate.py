@@ -21,7 +21,7 @@ RADIATOR_K = 36.0  # a wide open radiator lifts the room so far above outside in
 VALVE_BAND_K = 1.5  # from shut to wide open
 AIR_CHANGE_S = 2 * 3600.0  # until most of a room's air is new
 FREE_HEAT_K = 3.0  # what people, kitchen and sun lift it by
-FREE_VAPOUR_PA = 300.0  # and what they add to the vapour outside
+FREE_VAPOUR_PA = 250.0  # and what they add to the vapour outside
 NIGHT = (23, 6)  # hours on the wall clock
 PERIODS_S = (2_900.0, 11_300.0, 47_000.0)  # of `wander`; none a multiple of another, so that no two hours are alike
 
@@ -42,11 +42,15 @@ def is_night(local: datetime) -> bool:
     return local.hour >= NIGHT[0] or local.hour < NIGHT[1]
 
 
+def season(local: datetime) -> float:
+    """Mean temperature of a day in °C."""
+    return 15.0 + 9.0 * cos(2 * pi * (local.timetuple().tm_yday - 200) / 365)
+
+
 def outside(seed: int, local: datetime) -> float:
     """Temperature outside in °C: warmest in July and at three in the afternoon, with a weather of its own."""
-    year = cos(2 * pi * (local.timetuple().tm_yday - 200) / 365)
     hour = local.hour + local.minute / 60 + local.second / 3600
-    return 15.0 + 9.0 * year + 4.5 * cos(2 * pi * (hour - 15) / 24) + 2.0 * wander(f"{seed}/weather", local.timestamp())
+    return season(local) + 4.5 * cos(2 * pi * (hour - 15) / 24) + 2.0 * wander(f"{seed}/weather", local.timestamp())
 
 
 def saturation(celsius: float) -> float:
@@ -54,9 +58,9 @@ def saturation(celsius: float) -> float:
     return 611.2 * exp(17.62 * celsius / (243.12 + celsius))
 
 
-def vapour_outside(seed: int, celsius: float, time: float) -> float:
-    """Vapour pressure outside in Pa; three quarters of what the air could hold, more or less."""
-    return (0.75 + 0.1 * wander(f"{seed}/damp", time)) * saturation(celsius)
+def vapour_outside(seed: int, local: datetime) -> float:
+    """Vapour pressure outside in Pa: a good half of what the air of the season can hold, by day and by night."""
+    return (0.57 + 0.1 * wander(f"{seed}/damp", local.timestamp())) * saturation(season(local))
 
 
 def relative(vapour: float, celsius: float) -> float:

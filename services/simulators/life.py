@@ -77,7 +77,7 @@ class Life:
 
     def _look_outside(self, time: float) -> None:
         self._outdoor = climate.outside(self._seed, self._local(time))
-        self._damp = climate.vapour_outside(self._seed, self._outdoor, time)
+        self._damp = climate.vapour_outside(self._seed, self._local(time))
 
     def _step(self, time: float) -> None:
         self._look_outside(time)
