@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from services.bus import embedded
+
 from services.config import Apartment, load
-from services.peers import Missing, answers, free_port, mariadb, mosquitto, ros
+from services.peers import Missing, answers, embedded, free_port, mariadb, mosquitto, ros
 from services.supervisor import Supervisor, command, in_background
 
 CONFIG = Path(__file__).parents[1] / "config"

@@ -21,10 +21,11 @@ LONGEST_MODULE = 300
 
 # Who may import which of ours, besides its own package (`services.camera` its parts, a module itself).
 WORDS = ("services.errors", "services.section", "services.states")
-CORE = (*WORDS, "services.payloads", "services.bus", "services.topics", "services.home")
-SHELL = ("services.config", "services.registry", "services.runner", "services.supervisor")
-BUSES = ("services.bus.mqtt", "services.bus.memory", "services.bus.embedded")
-SERVICE = (*CORE, "services.runner", "services.config")  # they meet on the bus, never in an import
+CORE = (*WORDS, "services.payloads", "services.bus", "services.topic", "services.topics", "services.home")
+FILES_OF_OURS = ("services.document", "services.secret_store")  # reading YAML, finding secrets
+SHELL = ("services.config", "services.registry", "services.runner", "services.aside", "services.process")
+BUSES = ("services.bus.mqtt", "services.bus.memory", "services.bus.connection", "services.bus.outbox")
+SERVICE = (*CORE, "services.runner", "services.document")  # they meet on the bus, never in an import
 LAYERS: dict[str, tuple[str, ...]] = {
     "services": (),
     "services.errors": (),
@@ -33,15 +34,21 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.payloads": ("services.errors",),
     "services.bus": ("services.errors",),
     "services.home": WORDS,
-    "services.topics": (*WORDS, "services.bus", "services.payloads"),
-    "services.bus.mqtt": CORE,
-    "services.bus.memory": CORE,
-    "services.bus.embedded": CORE,
+    "services.topic": (*WORDS, "services.bus", "services.payloads"),
+    "services.topics": (*WORDS, "services.bus", "services.payloads", "services.topic"),
+    "services.bus.mqtt": (*CORE, "services.bus.connection", "services.bus.outbox"),
+    "services.bus.memory": (*CORE, "services.bus.outbox"),
+    "services.bus.connection": CORE,
+    "services.bus.outbox": CORE,
     "services.vision": ("services.errors",),
     "services.storage": ("services.errors",),
-    "services.registry": CORE,
-    "services.config": (*CORE, "services.registry"),
-    "services.runner": (*CORE, "services.config", *BUSES),
+    "services.document": ("services.errors",),
+    "services.secret_store": ("services.errors", "services.document"),
+    "services.registry": (),
+    "services.access": (*CORE, "services.registry"),
+    "services.aside": CORE,
+    "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
+    "services.runner": (*CORE, "services.aside"),
     "services.camera": (*SERVICE, "services.vision"),
     "services.bridge": (*SERVICE, "services.vision"),
     "services.persistence": (*SERVICE, "services.storage"),
@@ -50,8 +57,11 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.mission": SERVICE,
     "services.dashboard": SERVICE,
     "services.simulators": (*SERVICE, "services.vision"),
-    "services.peers": (*CORE, *BUSES, *SHELL),
-    "services.supervisor": (*CORE, *BUSES, *SHELL),
+    "services.process": (*CORE, *BUSES, *SHELL),
+    "services.supervisor": ("services.process",),
+    "services.client": (*CORE, *BUSES, *SHELL),
+    "services.peers": (*CORE, "services.access"),
+    "services.simulated": (*CORE, *SHELL, "services.peers", "services.supervisor"),
     "services.demo": ("services",),
     "services.pytest_plugin": ("services",),
     "services.__main__": ("services",),
@@ -64,13 +74,13 @@ DOORS: dict[str, tuple[str, ...]] = {
     "pydantic": EVERYWHERE,
     "pydantic_core": EVERYWHERE,
     "numpy": EVERYWHERE,
-    "paho": ("services.bus.mqtt",),
-    "amqtt": ("services.bus.embedded",),
-    "httpx": ("services.camera.brands.", "services.openhab.rest"),
+    "paho": ("services.bus.mqtt", "services.bus.connection"),
+    "amqtt": ("services.peers.embedded",),
+    "httpx": ("services.camera.brands.", "services.camera.digest", "services.camera.web", "services.openhab.rest"),
     "cv2": ("services.vision.", "services.camera.video", "services.bridge.images", "services.simulators.camera."),
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
-    "yaml": ("services.config",),
+    "yaml": ("services.document",),
     "typer": ("services.__main__",),
     "rich": ("services.__main__", "services.demo"),
     "starlette": ("services.dashboard.http",),
@@ -201,7 +211,9 @@ def test_only_the_command_line_prints(module: str) -> None:
 
 
 def catches_all(handler: ast.ExceptHandler) -> bool:
-    """Whether an except takes whatever comes."""
+    """Whether an except takes whatever comes, and keeps it: one that raises it again at its end only notes it."""
+    if isinstance(handler.body[-1], ast.Raise) and handler.body[-1].exc is None:
+        return False
     if handler.type is None:
         return True
     types = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
