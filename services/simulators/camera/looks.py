@@ -24,7 +24,7 @@ def _plain(image: Image, side: str, rng: Generator) -> None:
 
 def _wall(image: Image, side: str, rng: Generator) -> None:
     height, width = image.shape[:2]
-    fall = np.linspace(1.0, 0.9, height)[:, None, None]
+    fall = np.linspace(1.0, 1.0 - 0.1 * height / (2.6 * DENSITY), height)[:, None, None]
     image[:] = (image * fall).astype(np.uint8)
     if height > 2.5 * DENSITY:  # only where it stands on the floor
         image[height - round(0.07 * DENSITY) :] = (222, 226, 228)

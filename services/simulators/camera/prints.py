@@ -20,6 +20,7 @@ MARGIN = 1  # modules of white around the black square
 SAMPLES_TARGET = 250_000  # sub-samples of one marker, which sets how finely each pixel is divided
 PAD = 2
 NEAR_M = 0.05
+LIFT_M = 1e-4  # so that what it lies on does not hide it
 
 
 @dataclass(frozen=True)
@@ -87,19 +88,19 @@ def _patch(marker: Marker, view: View) -> tuple[slice, slice] | None:
     return (slice(top, bottom), slice(left, right)) if left < right and top < bottom else None
 
 
-def _plane(marker: Marker, view: View, rays: Array) -> Array:
-    """Where rays (..., 2) of the camera meet the marker's plane, in its frame (..., 2)."""
+def _plane(marker: Marker, view: View, rays: Float32) -> Float32:
+    """Where rays (h, w, 2) of the camera meet the marker's plane, in its frame (h, w, 2): a homography."""
     seen = marker.pose.inverse() @ view.pose
-    way = np.concatenate([rays, np.ones((*rays.shape[:-1], 1))], axis=-1) @ seen.rotation.T
-    start = seen.translation
-    return np.asarray(start[:2] - way[..., :2] * (start[2] / way[..., 2:]))
+    turn, (x, y, z) = seen.rotation, seen.translation
+    to_plane = np.array([x * turn[2] - z * turn[0], y * turn[2] - z * turn[1], turn[2]])
+    return np.asarray(cv2.perspectiveTransform(rays, to_plane), np.float32)
 
 
 def _averaged(marker: Marker, view: View, rays: Float32) -> tuple[Float32, Float32]:
     """Mean grey of the print, and the part covered by the sheet, of every pixel of a patch."""
     height, width = rays.shape[:2]
     fine = int(np.clip(np.sqrt(SAMPLES_TARGET / (height * width)), 2, 8))
-    dense = np.asarray(cv2.resize(rays, (width * fine, height * fine), interpolation=cv2.INTER_LINEAR), np.float64)
+    dense = np.asarray(cv2.resize(rays, (width * fine, height * fine), interpolation=cv2.INTER_LINEAR), np.float32)
     module = marker.size / 7
     x, y = np.moveaxis(_plane(marker, view, dense) / module, -1, 0)
     count = 7 + 2 * MARGIN
@@ -113,8 +114,8 @@ def _averaged(marker: Marker, view: View, rays: Float32) -> tuple[Float32, Float
 
 def _free(marker: Marker, view: View, rays: Float32, boxes: list[Box]) -> NDArray[np.bool_]:
     """For every pixel of a patch, whether nothing stands between the camera and the marker."""
-    flat = _plane(marker, view, rays.reshape(-1, 2).astype(float))
-    points = marker.pose.apply(np.column_stack([flat, np.full(len(flat), 1e-4)]))
+    flat = _plane(marker, view, rays).reshape(-1, 2)
+    points = marker.pose.apply(np.column_stack([flat, np.full(len(flat), LIFT_M)]))
     hidden = np.zeros(len(points), bool)
     for box in boxes:
         hidden |= box.hides(view.pose.translation, points)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from cv2.typing import MatLike
 from numpy.typing import NDArray
 
 from services.simulators.camera import prints
@@ -25,7 +26,7 @@ NEAR_M = 0.05  # nothing nearer to the lens is drawn
 TOUCHING_M = 0.001  # boxes may overlap by this much and still count as apart: things lie on tables
 LIT_GREY = 214  # what is seen past everything: daylight
 WINDOWS = 3  # kept ready: main stream, substream, and a zoomed one
-NO_SECOND_MAP = np.empty(0, np.int16)
+BAND_PX = 96
 FINE = 16  # cv2's polygons in sixteenths of a pixel
 
 
@@ -52,7 +53,7 @@ class Bend:
     """How the pinhole picture of `size` (rows, columns) is bent for one window: where each pixel comes from."""
 
     rays: Float32
-    where: Float32
+    where: tuple[MatLike, MatLike]
     matrix: Array
     size: tuple[int, int]
 
@@ -63,7 +64,8 @@ def bend(lens: Lens, window: Window) -> Bend:
     low, high = (np.array([edge(ways[..., 0]), edge(ways[..., 1])]) for edge in (np.min, np.max))
     width, height = np.ceil((high - low) * focal).astype(int) + 3
     matrix = np.array([[focal, 0, 1 - low[0] * focal], [0, focal, 1 - low[1] * focal], [0, 0, 1]], float)
-    where = ways * np.float32(focal) + matrix[:2, 2].astype(np.float32)
+    x, y = (ways[..., i] * np.float32(focal) + np.float32(matrix[i, 2]) for i in (0, 1))
+    where = cv2.convertMaps(x, y, cv2.CV_16SC2)
     return Bend(ways, where, matrix, (int(height), int(width)))
 
 
@@ -90,7 +92,7 @@ class Scene:
         how = self._bends[window]
         flat = np.full((*how.size, 3), LIT_GREY, np.uint8)
         self._draw_all(Pinhole(flat, how.matrix), pose)
-        image = np.asarray(cv2.remap(flat, how.where, NO_SECOND_MAP, cv2.INTER_LINEAR), np.uint8)
+        image = np.asarray(cv2.remap(flat, *how.where, cv2.INTER_LINEAR), np.uint8)
         view = View(pose, self.lens, window, how.rays)
         for marker in self.world.markers:
             prints.draw(image, marker, view, self.boxes)
@@ -172,13 +174,18 @@ def draw_surface(flat: Pinhole, surface: Surface, to_camera: Transform) -> None:
     x1, y1 = min(int(most[0]) + 2, width), min(int(most[1]) + 2, height)
     if x0 >= x1 or y0 >= y1:
         return
-    image = _fitting(surface, outline, flat.matrix[0, 0])
-    shift = np.array([[1, 0, -x0], [0, 1, -y0], [0, 0, 1]], float)
-    to_pixels = shift @ flat.matrix @ np.column_stack([right, down, corner]) @ _from_texture(image)
-    patch = cv2.warpPerspective(image, to_pixels, (x1 - x0, y1 - y0), borderMode=cv2.BORDER_REPLICATE)
     mask = np.zeros((y1 - y0, x1 - x0), np.uint8)
     cv2.fillConvexPoly(mask, np.round((pixels - (x0, y0)) * FINE).astype(np.int32), 255, cv2.LINE_8, 4)
-    cv2.copyTo(patch, mask, flat.image[y0:y1, x0:x1])
+    image = _fitting(surface, outline, flat.matrix[0, 0])
+    to_pixels = flat.matrix @ np.column_stack([right, down, corner]) @ _from_texture(image)
+    for row in range(0, y1 - y0, BAND_PX):  # in bands, because a slanting surface fills little of its frame
+        x, y, width, height = cv2.boundingRect(mask[row : row + BAND_PX])
+        if width:
+            inside = mask[row + y : row + y + height, x : x + width]
+            spot = flat.image[y0 + row + y :, x0 + x :][:height, :width]
+            shift = np.array([[1, 0, -x0 - x], [0, 1, -y0 - row - y], [0, 0, 1]], float)
+            patch = cv2.warpPerspective(image, shift @ to_pixels, (width, height), borderMode=cv2.BORDER_REPLICATE)
+            cv2.copyTo(patch, inside, spot)
 
 
 def before_camera(polygon: Array) -> Array:
