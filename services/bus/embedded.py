@@ -1,80 +1,50 @@
-"""A broker inside Python (amqtt), for the demo and for tests where no mosquitto is installed.
+"""A broker written in Python (amqtt), for the demo and for tests where no mosquitto is installed.
 
-It speaks MQTT 3.1.1 only, keeps nothing over a restart, and has no accounts: loopback only.
+It runs in a process of its own, so that its work does not slow the caller's. It speaks MQTT 3.1.1 only, keeps
+nothing over a restart and has no accounts: loopback only. Not here: the real one, `peers/mosquitto.py`.
 """
 
 from __future__ import annotations
 
 import asyncio
+import importlib.util
 import logging
-import threading
+import signal
+import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
-from services.peers import Missing, answers, free_port, wait_until
+from services.peers import Missing, answers, free_port, running
 
 
 @contextmanager
 def broker(port: int = 0) -> Iterator[int]:
-    """Runs a broker on loopback in a thread of its own until the end of the block; yields its port.
-
-    Missing where amqtt is not installed.
-    """
+    """Runs a broker on loopback until the end of the block; yields its port. Missing where amqtt is not installed."""
+    if importlib.util.find_spec("amqtt") is None:
+        raise Missing("amqtt is not installed: pip install 'smart-apartment[embedded]'")
     port = port or free_port()
-    host = _Host(port)
-    thread = threading.Thread(target=host.run, name="embedded broker", daemon=True)
-    thread.start()
-    try:
-        wait_until(lambda: host.ended() or answers(port), "embedded broker", 15.0)
+    command = [sys.executable, "-m", __name__, str(port)]
+    with tempfile.TemporaryDirectory() as folder, running(command, Path(folder) / "log", lambda: answers(port)):
         yield port
-    finally:
-        host.stop()
-        thread.join(10.0)
 
 
-class _Host:
-    """The thread that the broker's event loop lives in."""
+async def _serve(port: int) -> None:
+    from amqtt.broker import Broker
 
-    def __init__(self, port: int) -> None:
-        try:
-            from amqtt.broker import Broker
-        except ImportError as error:
-            raise Missing("amqtt is not installed: pip install 'smart-apartment[embedded]'") from error
-        self._make = Broker
-        self._settings = _settings(port)
-        self._loop = asyncio.new_event_loop()
-        self._stopping = asyncio.Event()
-        self._failure: BaseException | None = None
-
-    def run(self) -> None:
-        """The thread's body."""
-        try:
-            self._loop.run_until_complete(self._serve())
-        except (OSError, RuntimeError) as error:
-            self._failure = error
-        finally:
-            self._loop.close()
-
-    def ended(self) -> bool:
-        """False while it runs; raises what ended it."""
-        if self._failure is not None:
-            raise RuntimeError("the embedded broker did not start") from self._failure
-        return False
-
-    def stop(self) -> None:
-        """Asks it to end, from any thread."""
-        if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._stopping.set)
-
-    async def _serve(self) -> None:
-        logging.getLogger("transitions").setLevel(logging.WARNING)
-        logging.getLogger("amqtt").setLevel(logging.CRITICAL)  # a client that only looks is an error to it
-        self._loop.set_exception_handler(_ignore_lost_client)
-        broker = self._make(self._settings)
-        await broker.start()
-        await self._stopping.wait()
-        await broker.shutdown()
+    logging.getLogger("transitions").setLevel(logging.WARNING)
+    logging.getLogger("amqtt").setLevel(logging.CRITICAL)  # a client that only looks is an error to it
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(_ignore_lost_client)
+    stopping = asyncio.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, stopping.set)
+    server = Broker(_settings(port))
+    await server.start()
+    await stopping.wait()
+    await server.shutdown()
 
 
 def _ignore_lost_client(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
@@ -89,3 +59,7 @@ def _settings(port: int) -> dict[str, Any]:
         "listeners": {"default": {"type": "tcp", "bind": f"127.0.0.1:{port}", "max_connections": 100}},
         "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}},
     }
+
+
+if __name__ == "__main__":
+    asyncio.run(_serve(int(sys.argv[1])))
