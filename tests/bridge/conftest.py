@@ -29,7 +29,7 @@ class BridgeProcess:
         self.said: list[tuple[float, str, str]] = []
         self.process = subprocess.Popen(
             [sys.executable, "-m", "tests.bridge.bridge_process", json.dumps(config)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, **env}, text=True, cwd=ROOT,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, **env}, cwd=ROOT,
         )  # fmt: skip
         self._heard = threading.Condition()
         threading.Thread(target=self._listen, daemon=True).start()
@@ -37,7 +37,7 @@ class BridgeProcess:
     def hears(self, topic: str, payload: str) -> None:
         """A message on the bus."""
         assert self.process.stdin
-        self.process.stdin.write(json.dumps({"topic": topic, "payload": payload}) + "\n")
+        self.process.stdin.write(json.dumps({"topic": topic, "payload": payload}).encode() + b"\n")
         self.process.stdin.flush()
 
     def says(self, topic: str, holds: Callable[[str], bool], since: int = 0) -> float:
@@ -67,6 +67,8 @@ class BridgeProcess:
     def _listen(self) -> None:
         assert self.process.stdout
         for line in self.process.stdout:
+            if not line.startswith(b"{"):
+                continue  # rospy prints, too
             message = json.loads(line)
             with self._heard:
                 self.said.append((time.monotonic(), message["topic"], message["payload"]))

@@ -259,7 +259,7 @@ def test_a_node_that_was_shut_down_ends_the_service(bridge: Driven) -> None:
 
 
 def test_one_rules_fault_does_not_keep_the_others_from_theirs(bridge: Driven) -> None:
-    with pytest.raises(BadMessage, match="covariance.0.1"):
+    with pytest.raises(BadMessage, match=r"covariance\.0\.1"):
         bridge.hears("camera/ip1/scan/result", {**RESULT, "covariance": [[1e-4]]})
     assert [topic for topic, _ in bridge.node.published] == [
         "/ip_camera_scan/result/place", "/ip_camera_scan/result/position",
