@@ -185,8 +185,8 @@ CONVERT: dict[str, Callable[[Any], Any]] = {
 
 
 def _plain(value: Any) -> Any:
+    if hasattr(value, "to_sec"):
+        return value.to_sec()
     if hasattr(value, "_slot_types"):
         return fields_of(value)
-    if isinstance(value, list | tuple):
-        return [_plain(part) for part in value]
-    return value.to_sec() if hasattr(value, "to_sec") else value
+    return [_plain(part) for part in value] if isinstance(value, list | tuple) else value

@@ -65,13 +65,13 @@ class RosNode:
                 self._kept.put(topic, key if outlet.replay else "", message)
             publisher = self._publishers.get(topic)
         if publisher is not None:
-            publisher.publish(message)
+            self._send(publisher, message)
 
     def refresh(self) -> None:
         """See `Node`."""
         for topic, publisher in self._publishers.items():
             for message in self._kept.of(topic) if self._outlets[topic].replay else ():
-                publisher.publish(message)
+                self._send(publisher, message)
 
     def close(self) -> None:
         """See `Node`."""
@@ -80,6 +80,12 @@ class RosNode:
         leaving.start()
         leaving.join(LEAVE_S)
         self._registrar.join(LEAVE_S)
+
+    def _send(self, publisher: Any, message: Any) -> None:
+        try:
+            publisher.publish(message)
+        except self._rospy.ROSException as error:  # rospy closes topics when it is shut down; the registrar says why
+            log.debug("not sent: %s", error)
 
     def _register(self) -> None:
         """The registrar's thread."""
@@ -179,8 +185,13 @@ class _Greeter:
 
 
 def _rospy() -> Any:
-    """Its import puts its own logger class in Python's place, which loses the line of whoever logs."""
+    """Its import puts its own logger class in Python's place, which loses the line of whoever logs.
+
+    Of what it tells itself, every connection for one, our log gets the warnings.
+    """
     before = logging.getLoggerClass()
+    for name in ("rospy", "rosgraph"):
+        logging.getLogger(name).setLevel(logging.WARNING)
     try:
         return importlib.import_module("rospy")
     except ImportError as error:

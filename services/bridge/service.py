@@ -114,8 +114,8 @@ class Bridge:
             if fields is not None:
                 self.node.publish(rule.ros, fields, key=heard.message.topic)
                 self.counters["to_ros"] += 1
-        except BadMessage as fault:
-            return fault
+        except BadMessage as error:
+            return BadMessage(f"{heard.message.topic} to {rule.ros}: {error}")
         return None
 
     def _find_rules(self, topic: str) -> tuple[Rule, ...]:

@@ -79,8 +79,8 @@ def as_text(value: Any) -> str:
         raise BadMessage("expected a value that has a text, got bytes")
     try:
         return json.dumps(value, ensure_ascii=False, allow_nan=False)
-    except ValueError as error:
-        raise BadMessage(f"expected finite numbers, got {value!r:.80}") from error
+    except (ValueError, TypeError) as error:
+        raise BadMessage(f"expected finite numbers and texts, got {value!r:.80}") from error
 
 
 @lru_cache(maxsize=4096)
