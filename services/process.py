@@ -21,7 +21,8 @@ from typing import Any
 
 from services.aside import Aside
 from services.bus import WAKE_TOPIC, Message
-from services.bus.mqtt import Address, MqttBus
+from services.bus.connection import Address
+from services.bus.mqtt import MqttBus
 from services.config import Apartment, BusSettings, Instance, Tls
 from services.runner import Runner
 from services.topics import SERVICE_STATUS
@@ -42,7 +43,7 @@ LOG_FORMAT = "%(asctime)s.%(msecs)03d %(levelname)-7s %(name)s: %(message)s"
 
 def address(settings: BusSettings, client_id: str, account: str, **options: Any) -> Address:
     """Where the broker is, for a client that uses this account (anonymous without a password for it)."""
-    password = settings.accounts.get(account)
+    password = settings.accounts.get(account) or None  # an empty one is none
     return Address(
         client_id=client_id,
         host=settings.host,
@@ -84,9 +85,8 @@ def _off_bus(instance: Instance, stopping: threading.Event, ready: Ready) -> Non
 
 def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event, ready: Ready) -> None:
     row, name = instance.row, instance.name
-    account = row.account.replace("<cam>", name.removeprefix("camera-"))
     bus = MqttBus(
-        address(apartment.bus, name, account, protocol=row.protocol, durable=row.durable),
+        address(apartment.bus, name, name, protocol=row.protocol, durable=row.durable),
         birth=SERVICE_STATUS.message("online", service=name),
         will=SERVICE_STATUS.message("offline", service=name),
     )

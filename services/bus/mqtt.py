@@ -1,4 +1,4 @@
-"""The bus over paho, against any MQTT broker. The only file that knows paho.
+"""The bus over paho, against any MQTT broker. How a client of it is made is in `connection.py`.
 
 Every connection is a fresh paho client: what was in flight on the old one is not resent by paho behind our back,
 so no command arrives late; the outbox decides what is said again. Three threads: the service's own, which calls
@@ -10,47 +10,28 @@ from __future__ import annotations
 import logging
 import queue
 import random
-import socket
-import ssl
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any
 
 import paho.mqtt.client as paho
-from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
+from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
-from services.bus import WAKE_TOPIC, Message
+from services.bus import WAKE_TOPIC, Message, connection
+from services.bus.connection import CONNECT_TIMEOUT_S, WINDOW, Address
 from services.bus.outbox import Outbox
 
 log = logging.getLogger(__name__)
 
-WINDOW = 1000  # messages in a turn, and in flight from the broker (its max_inflight_messages is the same)
-QUEUED = 10_000  # outgoing messages that paho holds; more wait in the outbox
 RETRY_S = (0.1, 1.0)  # between attempts to connect: first, longest; a restarted broker is met again within 2 s
-CONNECT_TIMEOUT_S = 3.0
 FAREWELL_S = 2.0
 WAKE = Message(WAKE_TOPIC)
-
-
-@dataclass(frozen=True)
-class Address:
-    """Where the broker is and who we are there."""
-
-    client_id: str
-    host: str = "127.0.0.1"
-    port: int = 1883
-    user: str | None = None
-    password: str | None = field(default=None, repr=False)
-    tls: ssl.SSLContext | None = None
-    protocol: Literal[4, 5] = 5
-    keepalive_s: int = 15
-    durable: bool = False  # the broker keeps our messages while we are away
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +57,7 @@ class MqttBus:
         self.connections = 0
         self.session_present = False
         self._protocol = address.protocol
+        self._negotiated = address.protocol == 4
         self._will = will
         self._clock = clock
         self._filters: tuple[str, ...] = ()
@@ -227,9 +209,11 @@ class MqttBus:
             self._closing.wait(pause * random.uniform(0.8, 1.2))
 
     def _one_connection(self) -> None:
-        client = self._new_client()
         try:
-            client.connect(self.address.host, self.address.port, self.address.keepalive_s, **self._session())
+            if not self._negotiated:
+                self._protocol, self._negotiated = connection.negotiate(self.address), True
+            client = self._new_client()
+            connection.connect(client, self.address, self._protocol)
         except (OSError, ValueError) as error:
             self._tell(f"no connection to {self.address.host}:{self.address.port}: {error}")
             return
@@ -238,36 +222,8 @@ class MqttBus:
         self._up = 0
         client.loop_stop()
 
-    def _session(self) -> dict[str, Any]:
-        """No properties where none are needed: amqtt cannot skip them, and so cannot say that it speaks no MQTT 5."""
-        if self._protocol != 5:
-            return {}
-        if not self.address.durable:
-            return {"clean_start": True}
-        properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
-        properties.ReceiveMaximum = WINDOW
-        properties.SessionExpiryInterval = 0xFFFFFFFF
-        return {"clean_start": False, "properties": properties}
-
     def _new_client(self) -> paho.Client:
-        client = paho.Client(
-            CallbackAPIVersion.VERSION2,
-            client_id=self.address.client_id,
-            clean_session=None if self._protocol == 5 else not self.address.durable,
-            protocol=MQTTProtocolVersion(self._protocol),
-            manual_ack=True,
-            reconnect_on_failure=False,
-        )
-        client.connect_timeout = CONNECT_TIMEOUT_S
-        client.max_inflight_messages_set(WINDOW)
-        client.max_queued_messages_set(QUEUED)
-        if self.address.user is not None:
-            client.username_pw_set(self.address.user, self.address.password)
-        if self.address.tls is not None:
-            client.tls_set_context(self.address.tls)
-        if self._will is not None:
-            client.will_set(self._will.topic, self._will.payload, qos=1, retain=self._will.retain)
-        client.on_socket_open = _without_delay
+        client = connection.client(self.address, self._protocol, self._will)
         client.on_connect = self._on_connect
         client.on_disconnect = self._on_disconnect
         client.on_message = self._on_message
@@ -284,10 +240,7 @@ class MqttBus:
 
     def _on_connect(self, client: paho.Client, _data: Any, flags: Any, reason: ReasonCode, _properties: Any) -> None:
         if reason.is_failure:
-            if self._protocol == 5 and reason == "Unsupported protocol version":
-                self._protocol = 4
-            else:
-                self._tell(f"the broker refuses {self.address.client_id}: {reason}")
+            self._tell(f"the broker refuses {self.address.client_id}: {reason}")
             self._lost.set()
             return
         if self._told:
@@ -334,8 +287,3 @@ class MqttBus:
 
     def _on_publish(self, _client: paho.Client, _data: Any, mid: int, _reason: Any, _properties: Any) -> None:
         self._acknowledged.append(mid)
-
-
-def _without_delay(_client: paho.Client, _data: Any, sock: Any) -> None:
-    """Without this and `set_tcp_nodelay` in the broker one message in a hundred takes 40 ms (Nagle and delayed ack)."""
-    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -100,7 +100,9 @@ def _gather(views: Sequence[View]) -> _Sights:
             known.append(view)
     first = [place[0] for place in places]
     return _Sights(
-        np.array([v.lens.rays(np.mean([w.corners for w in place], axis=0)) for v, place in zip(first, places, strict=True)]),
+        np.array(
+            [v.lens.rays(np.mean([w.corners for w in place], axis=0)) for v, place in zip(first, places, strict=True)]
+        ),
         np.array([v.camera.rotation for v in first]),
         np.array([v.camera.translation for v in first]),
         np.array([v.size_m for v in first]),
