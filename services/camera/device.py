@@ -34,7 +34,7 @@ from services.runner import Post
 
 REPLY = "/camera/reply"
 STILL_DEG = 0.15  # two readings nearer than this are the same: the resolution is 0.1 degree
-END_S = 8.0  # how long the end of the service waits until the camera stands still
+END_S = 3.5  # the end of the service waits so long for a camera to stand still; then its watchdog goes on
 
 Turning = Callable[[Direction | None], None]
 

@@ -24,7 +24,8 @@ from services.camera.requests import Camera, Direction, Status
 from services.errors import DeviceError
 
 STILL = "-"
-END_S = 10.0
+END_S = 0.5  # the service waits so long for the end of its watchdog, which may still have something to stop
+STOP_S = 60.0  # the watchdog tries to stop a camera for so long
 COMMAND = "from services.camera.watchdog import main; main()"
 
 log = logging.getLogger(__name__)
@@ -51,7 +52,7 @@ class Watchdog:
             self.process.stdin.close()
             self.process.wait(END_S)
         except (OSError, subprocess.TimeoutExpired) as error:
-            log.error("the watchdog has not ended: %s", error)
+            log.warning("the watchdog is still at work: %s", error)
 
     def _write(self, line: str) -> None:
         assert self.process.stdin is not None
@@ -83,7 +84,7 @@ def watch(lines: Iterable[str], connect: Callable[[], Camera], clock: Callable[[
     if camera is None:
         return False
     if turning is not None:
-        stand_still(camera, clock, direction=turning)
+        stand_still(camera, clock, STOP_S, direction=turning)
     camera.close()
     return turning is not None
 
