@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -152,6 +153,19 @@ def test_a_message_reaches_who_asked_for_it_and_nobody_else(kit: Kit) -> None:
     assert [(m.topic, m.payload, m.retain) for m in take(listener, 1)] == [("reply/1/a", "21.5 °C".encode(), False)]
     assert [m.topic for m in take(deaf, 1)] == ["reply/1/b"]
     assert news(listener.receive(0.05)) == []
+
+
+def test_whenever_it_subscribes_it_hears_before_during_and_after_connecting(kit: Kit) -> None:
+    speaker = kit.client("speaker")
+    for pause in (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3):  # on loopback a connection takes some milliseconds
+        late = kit.make(f"late{pause}")
+        kit.buses.append(late)
+        threading.Event().wait(pause)  # a service that is still importing: nothing receives yet
+        late.subscribe(["reply/late"])
+        until(lambda bus=late: bus.connected, late)
+        listen(late)
+        speaker.publish(Message("reply/late", str(pause).encode()))
+        assert take(late, 1, speaker)[-1].payload == str(pause).encode()
 
 
 def test_order_is_kept(kit: Kit) -> None:
