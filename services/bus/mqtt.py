@@ -89,7 +89,7 @@ class MqttBus:
     def subscribe(self, filters: Sequence[str]) -> None:
         """See `Bus`."""
         self._filters = (*self._filters, *filters)
-        if self.connected and self._client is not None:
+        if self._up and self._client is not None:  # whoever connects meanwhile sees the filters, or we see `_up`
             self._subscribe(self._client, filters)
 
     def publish(self, message: Message) -> None:
@@ -250,8 +250,8 @@ class MqttBus:
         self.session_present = bool(flags.session_present)
         self._acknowledged.clear()
         self.connections += 1
-        self._subscribe(client, self._filters)
         self._up = self.connections
+        self._subscribe(client, self._filters)
         self._inbox.put(WAKE)
 
     def _subscribe(self, client: paho.Client, filters: Sequence[str]) -> None:

@@ -154,6 +154,17 @@ def test_a_message_reaches_who_asked_for_it_and_nobody_else(kit: Kit) -> None:
     assert news(listener.receive(0.05)) == []
 
 
+def test_who_asks_late_and_has_not_received_yet_is_not_deaf(kit: Kit) -> None:
+    """A service that takes long to start: the connection stands before it asks and before its first turn."""
+    speaker, late = kit.client("speaker"), kit.make("late")
+    kit.buses.append(late)
+    until(lambda: late.connections == 1, speaker)
+    speaker.receive(0.1, most=0)  # the connection has asked for all that it was told to ask for
+    listen(late, "reply/+/a")
+    speaker.publish(Message("reply/1/a", b"heard"))
+    assert [m.payload for m in take(late, 1, speaker)] == [b"heard"]
+
+
 def test_order_is_kept(kit: Kit) -> None:
     speaker, listener = kit.client("speaker"), kit.client("listener")
     listen(listener, "reply/#")
