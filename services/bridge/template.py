@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any
 
-from services.errors import BadMessage
+from services.errors import ApartmentError, BadMessage
 
 Path = tuple[str, ...]
 Look = Callable[[Path], Any]
 PLACE = re.compile(r"\{([A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z0-9_]+)*)\}")
 
 
-class Absent(Exception):
+class Absent(ApartmentError):
     """A value that is null: there is nothing to say, and that is no fault."""
 
 
