@@ -11,7 +11,9 @@ from services.topics import CAMERA_SCAN_RESULT, CAMERA_SCAN_STATE, DIAGNOSTICS, 
 
 HOME = Home(
     items={
-        "Lab_Temp": Item(type="Number:Temperature", label="Lab", unit="°C", persist=("everyUpdate", "restoreOnStartup")),
+        "Lab_Temp": Item(
+            type="Number:Temperature", label="Lab", unit="°C", persist=("everyUpdate", "restoreOnStartup")
+        ),
         "Kitchen_Light": Item(type="Switch", label="Light"),
         "Front_Door": Item(type="Contact", label="Door"),
         "Hall_Dimmer": Item(type="Dimmer", label="Hall"),
@@ -20,7 +22,8 @@ HOME = Home(
     }
 )
 STATES = {
-    "Lab_Temp": "06:00 20.0 °C; 06:30 20.5 °C; 07:00 21.5 °C; 07:30 UNDEF; 08:00 22.0 °C; 08:30:00.250 21.0 °C; 09:00 21.0 °C",
+    "Lab_Temp": "06:00 20.0 °C; 06:30 20.5 °C; 07:00 21.5 °C; 07:30 UNDEF; 08:00 22.0 °C; "
+    "08:30:00.250 21.0 °C; 09:00 21.0 °C",
     "Kitchen_Light": "06:10 ON; 06:40 OFF; 07:15:00.250 ON; 08:45:00.250 OFF",
     "Front_Door": "06:05 CLOSED; 07:14:58 OPEN; 07:15:02 CLOSED",
     "Hall_Dimmer": "06:00:00 0; 07:00 60; 08:00 100",

@@ -13,8 +13,8 @@ import pytest
 
 from services.persistence import Config
 from services.persistence.service import Persistence
-from services.storage import Item, open_storage
 from services.states import base_type
+from services.storage import Item, open_storage
 from tests.databases import Database, shown
 from tests.storage import day
 
