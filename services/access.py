@@ -14,28 +14,27 @@ from pathlib import Path
 from services.registry import REGISTRY
 from services.topics import TABLE, Topic
 
-PEOPLE = ("operator", "openhab", "robot")  # accounts of no process of ours
-PLANNED = ("history", "mission", "dashboard")  # accounts that the table names already
+PLAYS = {row.name: row.plays for row in REGISTRY if row.plays}
 ITERATIONS = 101  # of PBKDF2, as mosquitto_passwd of Debian 12 writes
 
 
 def accounts(cameras: Iterable[str]) -> list[str]:
-    """Every account that a broker of ours knows, sorted."""
-    own = {row.account for row in REGISTRY if row.on_bus and "<cam>" not in row.account}
-    return sorted(
-        {*own, *PEOPLE, *(role for row in TABLE for role in (*row.writers, *row.readers) if "<" not in role)}
-    ) + [f"camera-{camera}" for camera in cameras]
+    """Every account that a broker of ours knows: services, roles of the table, one per camera."""
+    own = {row.name for row in REGISTRY if row.on_bus and "<cam>" not in row.name}
+    roles = {role for row in TABLE for role in (*row.writers, *row.readers) if "<" not in role}
+    return [*sorted(own | roles), *(f"camera-{camera}" for camera in cameras)]
 
 
-def acl(cameras: Iterable[str], *, anonymous: str | None = None) -> str:
+def acl(cameras: Iterable[str], *, anonymous: bool = False) -> str:
     """mosquitto's acl_file: what each account may write and read.
 
-    `anonymous` is the account whose rights a client without a name has; the demo's, on loopback, the operator's.
+    `anonymous`: a client without a name may do everything. For the demo and for tests on loopback, where a newcomer
+    plays the home, the robot and the operator in turn; an installation has no such clients.
     """
     cameras = list(cameras)
     lines = ["# Written by `apartment topics --acl` from services/topics.py; a test keeps them equal.", ""]
-    if anonymous is not None:
-        lines += ["# whoever gives no name", *_rights(anonymous, cameras), ""]
+    if anonymous:
+        lines += ["# whoever gives no name", "topic readwrite #", ""]
     for account in accounts(cameras):
         lines += [f"user {account}", *_rights(account, cameras), ""]
     return "\n".join(lines)
@@ -64,7 +63,9 @@ def _add(rows: dict[str, str], account: str, topic: Topic, *, writes: bool, read
 
 
 def _may(account: str, roles: tuple[str, ...]) -> bool:
-    return account in roles or (account.startswith("camera-") and "camera-<cam>" in roles)
+    return (
+        account in roles or PLAYS.get(account) in roles or (account.startswith("camera-") and "camera-<cam>" in roles)
+    )
 
 
 def password_line(account: str, password: str) -> str:
@@ -78,7 +79,11 @@ def password_line(account: str, password: str) -> str:
 
 
 def write_passwords(file: Path, passwords: Mapping[str, str]) -> None:
-    """Writes the password file, for nobody else to read."""
-    text = "".join(f"{password_line(account, password)}\n" for account, password in passwords.items())
+    """Writes mosquitto's password file, for nobody else to read."""
+    write_private(file, "".join(f"{password_line(account, password)}\n" for account, password in passwords.items()))
+
+
+def write_private(file: Path, text: str) -> None:
+    """Writes a file with mode 0600 from its first byte on."""
     with open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w", encoding="utf-8") as output:
         output.write(text)

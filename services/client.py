@@ -50,7 +50,7 @@ class Client:
         return came
 
     def until(self, condition: Callable[[Message], bool], timeout_s: float = 10.0, what: str = "a message") -> Message:
-        """The first message, among those seen and those to come, that satisfies; TimeoutError names what was awaited."""
+        """The first message, seen already or still to come, that satisfies; TimeoutError names what was awaited."""
         end = time.monotonic() + timeout_s
         fresh = list(self.seen)
         while True:

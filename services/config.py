@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,7 +25,7 @@ from services.section import Section
 
 M = TypeVar("M", bound=BaseModel)
 TOP = ("bus", "state", "home", "default_camera")
-INJECTED = ("name", "home", "cameras", "folder")
+INJECTED = ("name", "home", "cameras", "folder")  # see `section.py`
 
 
 class Tls(Section):
@@ -66,12 +66,6 @@ class Apartment:
     cameras: tuple[str, ...]
     instances: dict[str, Instance] = field(default_factory=dict)
 
-    def account(self, instance: Instance) -> tuple[str | None, SecretStr | None]:
-        """User and password of a service at the broker."""
-        user = instance.row.account.replace("<cam>", instance.name.removeprefix("camera-"))
-        password = self.bus.accounts.get(user)
-        return (user, password) if password is not None else (None, None)
-
 
 class Top(Section):
     """The keys at the top of the file that belong to no service."""
@@ -82,24 +76,24 @@ class Top(Section):
     default_camera: str | None = None
 
 
-def load(file: Path, only: tuple[str, ...] | None = None) -> Apartment:
-    """Reads and checks; ConfigError with every fault. `only`: the services to run; the others' secrets may be absent."""
-    secret = secret_store.lookup()
+def load(file: Path, only: tuple[str, ...] | None = None, environment: Mapping[str, str] = os.environ) -> Apartment:
+    """Reads and checks; ConfigError with every fault. `only`: services to run; the others' secrets may be absent."""
+    secret = secret_store.lookup(environment)
     source = document.read(file, secret)
     raw = source.value if isinstance(source.value, dict) else {}
     if not source.faults and not raw:
         source.fault((), "expected sections such as bus, home and cameras, got nothing")
     top = _model(Top, {key: raw[key] for key in TOP if key in raw}, source, ())
-    home, home_faults = _home(file.parent / top.home) if top else (None, [])
-    cameras = _cameras(raw, source, top)
+    home, home_faults = _home(file.parent / raw["home"]) if isinstance(raw.get("home"), str) else (None, [])
+    cameras = _cameras(raw, source)
     given = {"home": home, "cameras": cameras, "folder": file.parent}
     _unknown_sections(raw, source)
-    instances = [] if home is None and top else list(_instances(raw, source, cameras, given))
+    instances = list(_instances(raw, source, cameras, given))
     faults = [*_wanted(source.faults, only), *home_faults]
     if faults or top is None or home is None:
         raise ConfigError(sorted(dict.fromkeys(faults), key=_by_place))
     by_name = {instance.name: instance for instance in instances}
-    return Apartment(file, top.bus, home, _state_folder(top, file), cameras, by_name)
+    return Apartment(file, top.bus, home, _state_folder(top, file, environment), cameras, by_name)
 
 
 def _by_place(fault: str) -> tuple[str, int]:
@@ -127,12 +121,12 @@ def _wanted(faults: list[str], only: tuple[str, ...] | None) -> list[str]:
     return [fault for fault in faults if matters(fault)]
 
 
-def _state_folder(top: Top, file: Path) -> Path:
+def _state_folder(top: Top, file: Path, environment: Mapping[str, str]) -> Path:
     if top.state is not None:
         return file.parent / top.state
-    if "STATE_DIRECTORY" in os.environ:
-        return Path(os.environ["STATE_DIRECTORY"].split(":")[0])
-    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "apartment"
+    if "STATE_DIRECTORY" in environment:
+        return Path(environment["STATE_DIRECTORY"].split(":")[0])
+    return Path(environment.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "apartment"
 
 
 def _home(file: Path) -> tuple[Home | None, list[str]]:
@@ -144,10 +138,10 @@ def _home(file: Path) -> tuple[Home | None, list[str]]:
     return home, source.faults
 
 
-def _cameras(raw: dict[str, Any], source: Document, top: Top | None) -> tuple[str, ...]:
+def _cameras(raw: dict[str, Any], source: Document) -> tuple[str, ...]:
     """The names of the cameras, the default one first."""
     names = list(raw["cameras"]) if isinstance(raw.get("cameras"), dict) else []
-    default = top.default_camera if top else None
+    default = raw.get("default_camera")
     if default is not None and default not in names:
         source.fault(
             ("default_camera",), f"expected one of the cameras ({', '.join(map(str, names))}), got {default!r}"
@@ -198,14 +192,16 @@ def _config(row: Row, settings: Any, source: Document, section: Path_, given: di
         if key in settings and key in model.model_fields:
             source.fault((*section, key), "expected no such key here, it is given by the program")
     wanted = {key: value for key, value in given.items() if key in model.model_fields and value is not None}
-    return _model(model, {**settings, **wanted}, source, section)
+    return _model(model, {**settings, **wanted}, source, section, given=INJECTED)
 
 
-def _model(model: type[M], values: Any, source: Document, path: Path_) -> M | None:
+def _model(model: type[M], values: Any, source: Document, path: Path_, given: tuple[str, ...] = ()) -> M | None:
     try:
         return model.model_validate(values)
     except ValidationError as error:
         for fault in error.errors(include_url=False):
+            if fault["loc"] in [(name,) for name in given] and fault["type"] == "missing":
+                continue  # what is given was faulty itself, and is told there
             where = (*path, *(part for part in fault["loc"] if not _is_a_tag(part)))
             source.fault(where, _expected(fault, model))
         return None

@@ -43,7 +43,7 @@ LOG_FORMAT = "%(asctime)s.%(msecs)03d %(levelname)-7s %(name)s: %(message)s"
 
 def address(settings: BusSettings, client_id: str, account: str, **options: Any) -> Address:
     """Where the broker is, for a client that uses this account (anonymous without a password for it)."""
-    password = settings.accounts.get(account)
+    password = settings.accounts.get(account) or None  # an empty one is none
     return Address(
         client_id=client_id,
         host=settings.host,
@@ -85,9 +85,8 @@ def _off_bus(instance: Instance, stopping: threading.Event, ready: Ready) -> Non
 
 def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event, ready: Ready) -> None:
     row, name = instance.row, instance.name
-    account = row.account.replace("<cam>", name.removeprefix("camera-"))
     bus = MqttBus(
-        address(apartment.bus, name, account, protocol=row.protocol, durable=row.durable),
+        address(apartment.bus, name, name, protocol=row.protocol, durable=row.durable),
         birth=SERVICE_STATUS.message("online", service=name),
         will=SERVICE_STATUS.message("offline", service=name),
     )

@@ -27,19 +27,33 @@ class Row:
     durable: bool = False
     protocol: Literal[4, 5] = 5
     on_bus: bool = True
-    account: str = ""  # of the broker; the name itself when empty
+    plays: str = ""  # the role at the broker that it has besides its own
     default: bool = False  # runs even when the configuration has no section for it
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "account", self.account or self.name)
 
 
 REGISTRY: tuple[Row, ...] = (
-    Row("simulated-camera", "services.simulators.camera", ("simulators", "camera"),
-        "a camera on the network that is not there", on_bus=False),
-    Row("simulated-home", "services.simulators.home", ("simulators", "home"),
-        "lights, doors and sensors that answer as OpenHAB would", account="openhab"),
-    Row("persistence", "services.persistence", ("persistence",), "writes what happens to the database", durable=True, protocol=4),
+    Row(
+        "simulated-camera",
+        "services.simulators.camera",
+        ("simulators", "camera"),
+        "a camera on the network that is not there",
+        on_bus=False,
+    ),
+    Row(
+        "simulated-home",
+        "services.simulators.home",
+        ("simulators", "home"),
+        "lights, doors and sensors that answer as OpenHAB would",
+        plays="openhab",
+    ),
+    Row(
+        "persistence",
+        "services.persistence",
+        ("persistence",),
+        "writes what happens to the database",
+        durable=True,
+        protocol=4,
+    ),
     Row("camera-<cam>", "services.camera", ("cameras", "<cam>"), "drives one camera: places, orders, scans"),
     Row("bridge", "services.bridge", ("bridge",), "maps the bus to ROS 1 topics and back"),
-)  # fmt: skip
+)

@@ -1,7 +1,7 @@
 """The bus contract: what a message is, what a bus can do, and how topics match filters.
 
 Not here: the implementations, `memory.py` (in this process), `mqtt.py` (paho, any broker) and `embedded.py`
-(a broker in this process). One contract test, `tests/bus/test_contract.py`, runs against all of them.
+One contract test, `tests/bus/test_contract.py`, runs against all of them.
 """
 
 from __future__ import annotations

@@ -75,6 +75,11 @@ class MemoryBus:
         """How many messages could not be kept while there was no connection."""
         return self._outbox.dropped
 
+    @property
+    def unacknowledged(self) -> list[Message]:
+        """What a durable client has been given and has not acknowledged."""
+        return list(self._unacked)
+
     def connect(self) -> None:
         """As after every reconnect: what the outbox kept goes out, the retained states come in."""
         self.connected = True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import json
 import re
 import secrets
 from collections.abc import Iterable, Iterator
@@ -29,12 +30,12 @@ class Broker:
 
 @contextmanager
 def private(
-    folder: Path, cameras: Iterable[str] = ("ip1",), port: int = 0, *, anonymous: str | None = None, conf: Path = CONF
+    folder: Path, cameras: Iterable[str] = ("ip1",), port: int = 0, *, anonymous: bool = False, conf: Path = CONF
 ) -> Iterator[Broker]:
     """Runs a broker in `folder` until the end of the block; Missing where mosquitto is not installed.
 
-    `anonymous`: the account whose rights clients without a name have (None: they are refused). Started again on the
-    same folder and port it has its retained messages and sessions back.
+    `anonymous`: whether clients without a name are let in (see `access.acl`). Started again on the same folder and
+    port it has its passwords, retained messages and sessions back.
     """
     command = program("mosquitto", "mosquitto")
     cameras = list(cameras)
@@ -42,16 +43,21 @@ def private(
     folder.mkdir(parents=True, exist_ok=True)
     passwords = _passwords(folder, cameras)
     (folder / "acl").write_text(access.acl(cameras, anonymous=anonymous), encoding="utf-8")
-    (folder / "mosquitto.conf").write_text(_here(conf.read_text(encoding="utf-8"), folder, port, anonymous is not None))
+    (folder / "mosquitto.conf").write_text(_here(conf.read_text(encoding="utf-8"), folder, port, anonymous))
     arguments = [command, "-c", str(folder / "mosquitto.conf")]
     with running(arguments, folder / "mosquitto.log", lambda: answers(port)) as process:
         yield Broker(port, folder, passwords, pid=process.pid)
 
 
 def _passwords(folder: Path, cameras: list[str]) -> dict[str, str]:
-    """Random ones for every account, as a password file; the plain ones go to whoever started the broker."""
+    """Random ones for every account, made once: hashed for the broker, plain for whoever started it."""
+    plain = folder / "plain-passwords.json"
+    if plain.exists():
+        kept: dict[str, str] = json.loads(plain.read_text(encoding="utf-8"))
+        return kept
     passwords = {account: secrets.token_urlsafe(16) for account in access.accounts(cameras)}
     access.write_passwords(folder / "passwords", passwords)
+    access.write_private(plain, json.dumps(passwords))
     return passwords
 
 

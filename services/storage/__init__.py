@@ -182,6 +182,10 @@ class Storage(Protocol):
         """The samples of `since <= time < until`, oldest first; with `limit` the newest so many of them."""
         ...
 
+    def sightings(self, marker: int, limit: int) -> list[Sighting]:
+        """Where a marker was seen, newest first."""
+        ...
+
     def close(self) -> None:
         """Ends the connection."""
 

@@ -15,7 +15,7 @@ import pymysql
 from pymysql import err
 
 from services.errors import BadMessage, ConfigError, Unavailable
-from services.storage import Address, Batch, Diagnostic, Item, Sample
+from services.storage import Address, Batch, Diagnostic, Item, Sample, Sighting
 from services.storage import mysql_text as sql
 from services.storage.migrate import migrate
 
@@ -124,6 +124,10 @@ class MysqlStorage:
         """See `Storage`."""
         rows = self._read(sql.samples(item, since, until, limit, self._connection.escape))
         return [Sample(*row) for row in reversed(rows)]
+
+    def sightings(self, marker: int, limit: int) -> list[Sighting]:
+        """See `Storage`."""
+        return [Sighting(*row) for row in self._read(sql.sightings(marker, limit))]
 
     def close(self) -> None:
         """See `Storage`."""

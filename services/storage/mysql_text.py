@@ -124,6 +124,14 @@ def samples(item: str, since: int | None, until: int | None, limit: int | None, 
     )
 
 
+def sightings(marker: int, limit: int) -> str:
+    """Where a marker was seen, newest first."""
+    columns = (MICROSECONDS.format(name) if name in TIMES else name for name in COLUMNS["sighting"])
+    return (
+        f"SELECT {', '.join(columns)} FROM sighting WHERE marker={int(marker)} ORDER BY stamp DESC LIMIT {int(limit)}"
+    )
+
+
 def view_name(item: Item) -> str:
     """OpenHAB's name of the item's table."""
     return f"Item{item.item_id}"

@@ -13,7 +13,7 @@ from dataclasses import astuple, fields
 from typing import Any
 
 from services.errors import BadMessage, ConfigError, Unavailable
-from services.storage import FINAL_STATES, TABLES, Address, Batch, Diagnostic, Item, Sample
+from services.storage import FINAL_STATES, TABLES, Address, Batch, Diagnostic, Item, Sample, Sighting
 from services.storage.migrate import migrate
 
 BUSY_S = 5.0
@@ -150,6 +150,15 @@ class SqliteStorage:
                 item, *bounds.values(), -1 if limit is None else limit,
             )  # fmt: skip
         return [Sample(*row) for row in reversed(rows)]
+
+    def sightings(self, marker: int, limit: int) -> list[Sighting]:
+        """See `Storage`."""
+        columns = ", ".join(field.name for field in fields(Sighting))
+        with _translated():
+            rows = self._rows(
+                f"SELECT {columns} FROM sighting WHERE marker=? ORDER BY stamp DESC LIMIT ?", marker, limit
+            )
+        return [Sighting(*row) for row in rows]
 
     def close(self) -> None:
         """See `Storage`."""

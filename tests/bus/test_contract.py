@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from services import peers
-from services.bus import Message, embedded, topic_matches
+from services.bus import Message, topic_matches
 from services.bus.memory import Hub, MemoryBus
 from services.bus.mqtt import Address, MqttBus
-from services.peers import free_port, mosquitto
+from services.peers import embedded, free_port, mosquitto
 
 WITHIN_S = 5.0
 BIRTH = Message("service/operator/status", b"online", retain=True)
@@ -101,7 +101,7 @@ def make_kit(kind: str, folder: Path) -> Kit:
         made = BrokerKit(embedded.broker)
         made.keeps_retained = False
         return made
-    return BrokerKit(lambda port: mosquitto.private(folder, port=port, anonymous="operator"))
+    return BrokerKit(lambda port: mosquitto.private(folder, port=port, anonymous=True))
 
 
 def until(condition: Callable[[], Any], *buses: Any) -> Any:

@@ -1,0 +1,232 @@
+"""The camera on the network: connections, authentication, latency, pictures and the endless answers."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import sys
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from random import Random
+from threading import Event, Lock
+from typing import Any
+
+from services.simulators.camera import events
+from services.simulators.camera.device import Device
+from services.simulators.camera.digest import Door, Verdict
+from services.simulators.camera.messages import Answer, Request, read, refusal
+from services.simulators.camera.picture import Pictures, Stream
+
+IMAGE = "image/jpeg"
+LOG_LENGTH = 2000
+HEARTBEATS_S = (1.0, 60.0)
+ROOT = b"<html><head><title>WEB</title></head><body></body></html>"
+
+
+@dataclass
+class Faults:
+    """What the side door has ordered: how the next requests fail, and whether the camera is frozen."""
+
+    left: int = 0
+    how: str = "close"  # or 401, 500, text
+
+    def next(self) -> str | None:
+        """How this request is to fail."""
+        if self.left <= 0:
+            return None
+        self.left -= 1
+        return self.how
+
+
+class CameraServer(ThreadingHTTPServer):
+    """One camera's port: what all its connections share."""
+
+    daemon_threads = False
+    request_queue_size = 64
+
+    def __init__(
+        self, address: tuple[str, int], device: Device, door: Door, pictures: Pictures, clock: Callable[[], float]
+    ) -> None:
+        super().__init__(address, Connection)
+        self.device, self.door, self.pictures, self.clock = device, door, pictures, clock
+        self.latency_s, self.spread_s = device.profile.latency_s, device.profile.latency_spread_s
+        self.snapshot_s = device.profile.snapshot_s
+        self.closing, self.faults, self.log = Event(), Faults(), deque[dict[str, Any]](maxlen=LOG_LENGTH)
+        self.running = Event()  # cleared while frozen
+        self.running.set()
+        self.control, self.snapshot, self._lock = Lock(), Lock(), Lock()
+        self._open: set[socket.socket] = set()
+        self._rng = Random(1)
+
+    def delay(self, seconds: float, spread: float = 0.0) -> None:
+        """Waits as long as the camera needs, or until it is switched off."""
+        if seconds > 0:
+            self.closing.wait(seconds + self._rng.uniform(-spread, spread))
+
+    def judge(self, method: str, target: str, header: str | None) -> Verdict:
+        """The door's verdict, one request at a time."""
+        with self._lock:
+            return self.door.judge(method, target, header, self.clock())
+
+    def enter(self, connection: socket.socket) -> None:
+        """A connection was opened."""
+        with self._lock:
+            self._open.add(connection)
+
+    def leave(self, connection: socket.socket) -> None:
+        """A connection is about to be closed."""
+        with self._lock:
+            self._open.discard(connection)
+
+    def drop(self) -> None:
+        """Cuts every connection."""
+        with self._lock:
+            for connection in self._open:
+                with suppress(OSError):
+                    connection.shutdown(socket.SHUT_RDWR)
+        self.device.events.wake_all()
+
+    def switch_off(self) -> None:
+        """Ends every wait and connection, so that `server_close` finds no thread left."""
+        self.closing.set()
+        self.running.set()
+        self.drop()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A client that went away is none of our concern; anything else is a bug and told as usual."""
+        if not isinstance(sys.exc_info()[1], OSError):
+            super().handle_error(request, client_address)
+
+
+class Connection(BaseHTTPRequestHandler):
+    """One connection, one request: the camera closes after every answer."""
+
+    protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
+    server: CameraServer
+
+    def setup(self) -> None:
+        super().setup()
+        self.server.enter(self.connection)
+
+    def finish(self) -> None:
+        self.server.leave(self.connection)
+        super().finish()
+
+    def handle(self) -> None:
+        if self.server.device.booting(self.server.clock()) or self.server.closing.is_set():
+            self._reset()
+        else:
+            self.handle_one_request()
+
+    def do_GET(self) -> None:
+        self.close_connection = True
+        entry = {"time": self.server.clock(), "method": self.command, "target": self.path, "status": None}
+        entry["authorized"] = "Authorization" in self.headers
+        self.server.log.append(entry)
+        self.server.running.wait()
+        if fault := self.server.faults.next():
+            return self._fail(fault, entry)
+        if self.path == "/":
+            return self._send(Answer(ROOT, content_type="text/html"), entry)
+        verdict = self.server.judge(self.command, self.path, self.headers.get("Authorization"))
+        if verdict.passed:
+            return self._serve(read(self.path), entry)
+        return self._challenge(verdict, entry)
+
+    do_POST = do_GET  # noqa: N815 (the base class looks for these names)
+
+    def _serve(self, request: Request, entry: dict[str, Any]) -> None:
+        special = {("snapshot", ""): self._snapshot, ("mjpg/video", ""): self._video}
+        special[("eventManager", "attach")] = self._events
+        how = special.get((request.cgi, request.action), self._control)
+        how(request, entry)
+
+    def _control(self, request: Request, entry: dict[str, Any]) -> None:
+        """One at a time. A command acts when it has been processed; a status tells how it was when asked."""
+        with self.server.control:
+            reads = request.action.startswith("get")
+            answer = self.server.device.answer(request, self.server.clock()) if reads else None
+            self.server.delay(self.server.latency_s, self.server.spread_s if self.server.latency_s else 0.0)
+            answer = answer or self.server.device.answer(request, self.server.clock())
+        self._send(answer, entry)
+        if self.server.device.booting(self.server.clock()):
+            self.server.drop()
+
+    def _snapshot(self, request: Request, entry: dict[str, Any]) -> None:
+        """Overlapping snapshots fail."""
+        if not self.server.snapshot.acquire(blocking=False):
+            return self._send(refusal(self.server.device.profile), entry)
+        try:
+            self.server.delay(self.server.snapshot_s if self.server.latency_s else 0.0)
+            data = self.server.pictures.jpeg("MainFormat", self.server.clock())
+        finally:
+            self.server.snapshot.release()
+        return self._send(Answer(data, content_type=IMAGE), entry)
+
+    def _video(self, request: Request, entry: dict[str, Any]) -> None:
+        stream: Stream = "ExtraFormat" if request.text("subtype", "0") != "0" else "MainFormat"
+        kind = f"multipart/x-mixed-replace; boundary={events.BOUNDARY}"
+        entry["status"] = 200
+        self._write(f"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Type: {kind}\r\n\r\n".encode())
+        while not self.server.closing.is_set():
+            self.server.running.wait()
+            data = self.server.pictures.jpeg(stream, self.server.clock())
+            head = f"--{events.BOUNDARY}\r\nContent-Type: {IMAGE}\r\nContent-Length: {len(data)}\r\n\r\n"
+            self._write(head.encode() + data + b"\r\n")
+            self.server.closing.wait(1 / self.server.pictures.fps(stream))
+
+    def _events(self, request: Request, entry: dict[str, Any]) -> None:
+        least, most = HEARTBEATS_S
+        beat = request.text("heartbeat")
+        every = min(max(float(beat), least), most) if beat.isdigit() else most
+        subscription = self.server.device.events.subscribe(events.wanted(request.text("codes")))
+        entry["status"] = 200
+        try:
+            self._write(events.START)
+            while not self.server.closing.is_set():
+                text = subscription.next(every)
+                self.server.running.wait()
+                if text == "":
+                    return
+                if text or (beat and self.server.device.profile.heartbeat):
+                    self._write(events.part(text or "Heartbeat"))
+        finally:
+            self.server.device.events.leave(subscription)
+
+    def _challenge(self, verdict: Verdict, entry: dict[str, Any]) -> None:
+        entry["status"] = 401
+        offers = "".join(f"WWW-Authenticate: {offer}\r\n" for offer in verdict.challenges)
+        head = f"HTTP/1.1 401 Unauthorized\r\n{offers}Connection: close\r\nCONTENT-LENGTH: {len(verdict.body)}\r\n\r\n"
+        self._write(head.encode() + verdict.body)
+
+    def _fail(self, how: str, entry: dict[str, Any]) -> None:
+        entry["status"] = how
+        if how == "close":
+            return self._reset()
+        if how == "401":
+            return self._challenge(
+                Verdict(False, [f'Digest realm="{self.server.door.realm}",qop="auth",nonce="0"']), entry
+            )
+        return self._send(Answer(b"Error\r\n", 500) if how == "500" else Answer(b"busy\r\n"), entry)
+
+    def _send(self, answer: Answer, entry: dict[str, Any]) -> None:
+        entry["status"] = answer.status
+        head = f"HTTP/1.1 {answer.status} {HTTPStatus(answer.status).phrase}\r\nConnection: close\r\n"
+        head += f"Content-Length: {len(answer.body)}\r\nContent-Type: {answer.content_type}\r\n\r\n"
+        self._write(head.encode() + answer.body)
+
+    def _write(self, data: bytes) -> None:
+        self.connection.sendall(data)
+
+    def _reset(self) -> None:
+        """Closes without an answer, so that the other side sees a reset."""
+        self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        self.connection.close()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """The request log is the side door's."""

@@ -1,0 +1,143 @@
+"""What the camera makes of the scene: exposure while turning, noise, colour, flips, digital zoom and JPEG."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Lock
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from services.simulators.camera.config_tables import Tables
+from services.simulators.camera.motors import Pose, magnification
+from services.simulators.camera.optics import Window, project, window
+from services.simulators.camera.prints import Image
+from services.simulators.camera.scene import Scene
+from services.simulators.world import WorldCamera
+from services.vision.frames import Array
+
+Stream = Literal["MainFormat", "ExtraFormat"]
+EXPOSURE_S = 1 / 30  # indoors, by lamp light
+NOISE = 2.2  # grey levels, one sigma
+NOISE_PLAY = 64  # pixels by which the noise pattern is shifted from frame to frame
+QUALITY = 88
+AHEAD_M = 3.0  # distance at which the blur of a turn is taken
+
+
+@dataclass(frozen=True)
+class Still:
+    """A noiseless picture and what it shows."""
+
+    pose: Pose
+    window: Window
+    image: Image
+
+
+class Pictures:
+    """The newest picture of each stream as JPEG; the same one until the next frame is due. For several threads."""
+
+    def __init__(
+        self, scene: Scene, camera: WorldCamera, tables: Tables, motors: Callable[[float], tuple[Pose, Pose]], seed: int
+    ) -> None:
+        self._scene, self._camera, self._tables, self._motors = scene, camera, tables, motors
+        self._lock = Lock()
+        self._stills: dict[Stream, Still] = {}
+        self._newest: dict[Stream, tuple[object, bytes]] = {}
+        self._rng = np.random.default_rng(seed)
+        size = (camera.lens.height + NOISE_PLAY, camera.lens.width + NOISE_PLAY, 3)
+        self._noise = (self._rng.standard_normal(size, dtype=np.float32) * NOISE).round().astype(np.int8)
+
+    def fps(self, stream: Stream) -> int:
+        """Frames per second of a stream."""
+        return min(max(self._tables.number(f"Encode[0].{stream}[0].Video.FPS"), 1), 30)
+
+    def jpeg(self, stream: Stream, now: float) -> bytes:
+        """The picture of this moment, encoded."""
+        with self._lock:
+            pose, rates = self._motors(now)
+            key = (pose, self._tables.changes, int(now * self.fps(stream)))
+            if stream not in self._newest or self._newest[stream][0] != key:
+                self._newest[stream] = key, _encoded(self._developed(stream, pose, rates))
+            return self._newest[stream][1]
+
+    def _developed(self, stream: Stream, pose: Pose, rates: Pose) -> Image:
+        video = f"Encode[0].{stream}[0].Video."
+        size = (self._tables.number(video + "Width"), self._tables.number(video + "Height"))
+        still = self._still(stream, pose, size)
+        image = blurred(still.image, self._sweep(pose, rates, still.window))
+        image = _resized(self._noisy(image), size)
+        return upright(self._toned(image), self._camera, self._tables)
+
+    def _still(self, stream: Stream, pose: Pose, size: tuple[int, int]) -> Still:
+        """Drawn anew only when the camera has moved; never finer than the sensor."""
+        zoom, lens = magnification(pose.zoom), self._camera.lens
+        width, height = min(size[0], round(lens.width / zoom)), min(size[1], round(lens.height / zoom))
+        view, still = window(lens, zoom, width, height), self._stills.get(stream)
+        if still is None or (still.pose, still.window) != (pose, view):
+            still = Still(pose, view, self._scene.draw(self._camera.pose(pose.pan, pose.tilt), view))
+            self._stills[stream] = still
+        return still
+
+    def _sweep(self, pose: Pose, rates: Pose, view: Window) -> Array:
+        """How many pixels the middle of the picture moves during an exposure."""
+        if not rates.pan and not rates.tilt:
+            return np.zeros(2)
+        pans = (pose.pan + rates.pan * EXPOSURE_S, pose.tilt + rates.tilt * EXPOSURE_S)
+        ahead = self._camera.pose(pose.pan, pose.tilt).apply(np.array([[0.0, 0.0, AHEAD_M]]))
+        was, comes = (
+            view.from_sensor(project(self._camera.pose(*at).inverse().apply(ahead), self._camera.lens))[0]
+            for at in ((pose.pan, pose.tilt), pans)
+        )
+        return np.asarray(comes - was)
+
+    def _noisy(self, image: Image) -> Image:
+        height, width = image.shape[:2]
+        y, x = (int(i) for i in self._rng.integers(NOISE_PLAY, size=2))
+        patch = self._noise[y : y + height, x : x + width]
+        return np.asarray(cv2.add(image, patch, dtype=cv2.CV_8U), np.uint8)
+
+    def _toned(self, image: Image) -> Image:
+        """Black and white, saturation, contrast and brightness as the tables say."""
+        settings = {k: self._tables.number(f"VideoColor[0][0].{k}") for k in ("Brightness", "Contrast", "Saturation")}
+        saturation = 0 if self._tables.colour == "bw" else settings["Saturation"]
+        if saturation != 50:
+            grey = cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+            image = np.asarray(cv2.addWeighted(image, saturation / 50, grey, 1 - saturation / 50, 0), np.uint8)
+        if settings["Contrast"] == settings["Brightness"] == 50:
+            return image
+        gain, shift = 2 ** ((settings["Contrast"] - 50) / 50), (settings["Brightness"] - 50) * 1.2
+        curve = np.clip((np.arange(256) - 128) * gain + 128 + shift, 0, 255).astype(np.uint8)
+        return np.asarray(cv2.LUT(image, curve), np.uint8)
+
+
+def upright(image: Image, camera: WorldCamera, tables: Tables) -> Image:
+    """The picture as the flip and mirror options give it; a ceiling camera's sensor is upside down without them."""
+    turned = camera.mount.kind == "ceiling"
+    rows = -1 if tables.flag("VideoInOptions[0].Flip") != turned else 1
+    columns = -1 if tables.flag("VideoInOptions[0].Mirror") != turned else 1
+    return np.ascontiguousarray(image[::rows, ::columns])
+
+
+def blurred(image: Image, sweep: Array) -> Image:
+    """The mean over the sweep (pixels): halving steps, each the mean of the picture and itself moved."""
+    length = float(np.hypot(*sweep))
+    while length > 1.0:
+        sweep, length = sweep / 2, length / 2
+        move = np.array([[1, 0, sweep[0]], [0, 1, sweep[1]]])
+        size = (image.shape[1], image.shape[0])
+        moved = cv2.warpAffine(image, move, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        image = np.asarray(cv2.addWeighted(image, 0.5, moved, 0.5, 0), np.uint8)
+    return image
+
+
+def _resized(image: Image, size: tuple[int, int]) -> Image:
+    if (image.shape[1], image.shape[0]) == size:
+        return image
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), np.uint8)
+
+
+def _encoded(image: Image) -> bytes:
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    return data.tobytes()

@@ -1,0 +1,65 @@
+"""How firmware differs, as switches; a profile is one set of them.
+
+Sources and what is inferred: the Amcrest HTTP API facts (models IP3M-941, IP2M-841, 943B, 1041B and Dahua siblings).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The defaults are those of the IP3M-941W with firmware of 2016-2019, as far as that is known."""
+
+    model: str = "IP3M-941W"
+    firmware: str = "2.420.AC00.15.R"
+    built: str = "2016-09-08"
+    version_form: Literal["two lines", "one line"] = "two lines"
+    auth: Literal["basic", "digest", "digest+basic"] = "digest"
+    nonce: Literal["reusable", "single-use", "flaky"] = "reusable"
+    spaced_challenge: bool = False  # a space after the challenge's commas
+    lockout_failures: int = 5
+    lockout_s: float = 30 * 60.0
+    ptz_channels: tuple[int, ...] = (0, 1)
+    position_abs: Literal["full", "pan-only", "bad-request"] = "bad-request"
+    status_form: Literal["a", "b", "c"] = "a"
+    position_key: Literal["Postion", "Position"] = "Postion"
+    mirror_inverts_motors: bool = True
+    error_style: Literal["400-body", "200-error", "501"] = "200-error"
+    daynight: Literal["VideoInOptions", "VideoInDayNight"] = "VideoInOptions"
+    config_narrowing: bool = True  # a narrowed table name works; otherwise it gives an empty answer
+    heartbeat: bool = True
+    latency_s: float = 0.3  # of each control request
+    latency_spread_s: float = 0.1
+    snapshot_s: float = 0.5  # of each snapshot
+    boot_s: float = 60.0
+    pan_speeds: tuple[float, ...] = (1.0, 3.0, 6.0, 10.0, 16.0, 24.0, 34.0, 45.0)  # degrees/s at speeds 1 to 8
+    tilt_share: float = 0.6  # of the pan speed
+    zoom_speed: float = 4.0  # of its 8 levels, per second
+    preset_max: int = 25
+
+    def speed(self, level: int) -> float:
+        """Degrees per second of pan; a level out of range counts as the nearest."""
+        return self.pan_speeds[min(max(level, 1), len(self.pan_speeds)) - 1]
+
+
+PROFILES: dict[str, Profile] = {
+    "ip3m-941w-2019": Profile(),
+    "ip2m-841b-strict": Profile(
+        model="IP2M-841B", auth="basic", ptz_channels=(1,), status_form="b", error_style="400-body"
+    ),
+    "2020s-dahua": Profile(
+        model="IPC-AW46WN",
+        firmware="2.800.0000016.0.R",
+        built="2020-06-05",
+        version_form="one line",
+        nonce="single-use",
+        spaced_challenge=True,
+        ptz_channels=(1,),
+        error_style="501",
+        daynight="VideoInDayNight",
+        position_abs="full",
+    ),
+}

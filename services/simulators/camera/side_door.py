@@ -1,0 +1,110 @@
+"""The tests' way in, on a port of its own: JSON to see and to change what no real camera would tell.
+
+GET  /state                              true pose, reading, motion, counters of the door
+GET  /log                                requests: time, method, target, status, authorized
+POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand there at once
+POST /event    {"code", "action", "index"}
+POST /fail     {"n", "how"}              the next n requests: close, 401, 500 or text
+POST /drop     {}                        cuts every connection
+POST /freeze   {"on"}                    accepts, and answers nobody
+POST /latency  {"seconds"}               of every control request from now on
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from services.simulators.camera.http import CameraServer, Faults
+from services.simulators.camera.motors import reading
+
+Order = Callable[[CameraServer, dict[str, Any]], object]
+
+
+def state(camera: CameraServer) -> dict[str, Any]:
+    """What is true now."""
+    now = camera.clock()
+    pose, rates = camera.device.motion(now)
+    return {
+        "pose": pose._asdict(),
+        "reading": reading(pose)._asdict(),
+        "moving": any(rates),
+        "booting": camera.device.booting(now),
+        "presets": {number: name for number, (name, _) in camera.device.ptz.presets.items()},
+        "door": camera.door.counters,
+    }
+
+
+def _pose(camera: CameraServer, order: dict[str, Any]) -> None:
+    now = camera.clock()
+    pose, _ = camera.device.motion(now)
+    camera.device.place(pose._replace(**{key: float(value) for key, value in order.items()}), now)
+
+
+def _event(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.device.events.tell(str(order["code"]), str(order["action"]), int(order.get("index", 0)))
+
+
+def _fail(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.faults = Faults(int(order["n"]), str(order.get("how", "close")))
+
+
+def _freeze(camera: CameraServer, order: dict[str, Any]) -> None:
+    (camera.running.clear if order["on"] else camera.running.set)()
+
+
+def _latency(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.latency_s = float(order["seconds"])
+
+
+VIEWS: dict[str, Callable[[CameraServer], object]] = {"/state": state, "/log": lambda camera: list(camera.log)}
+ORDERS: dict[str, Order] = {
+    "/pose": _pose,
+    "/event": _event,
+    "/fail": _fail,
+    "/drop": lambda camera, order: camera.drop(),
+    "/freeze": _freeze,
+    "/latency": _latency,
+}
+
+
+class SideDoor(ThreadingHTTPServer):
+    """Serves one camera's side door."""
+
+    daemon_threads = False
+
+    def __init__(self, address: tuple[str, int], camera: CameraServer) -> None:
+        super().__init__(address, Visit)
+        self.camera = camera
+
+
+class Visit(BaseHTTPRequestHandler):
+    """One connection, one request."""
+
+    server: SideDoor
+
+    def do_GET(self) -> None:
+        if self.path not in VIEWS:
+            return self._send(404, {"error": f"expected one of {', '.join(VIEWS)}"})
+        return self._send(200, VIEWS[self.path](self.server.camera))
+
+    def do_POST(self) -> None:
+        try:
+            order = json.loads(self.rfile.read(int(self.headers.get("Content-Length", 0))) or b"{}")
+            ORDERS[self.path](self.server.camera, order)
+        except (KeyError, TypeError, ValueError) as fault:
+            return self._send(400, {"error": repr(fault)})
+        return self._send(200, {})
+
+    def _send(self, status: int, value: object) -> None:
+        body = json.dumps(value).encode()
+        self.send_response(status)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Silent."""

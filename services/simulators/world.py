@@ -1,0 +1,289 @@
+"""The truth that every simulator and test shares: rooms, walls, furniture, markers, camera and robot.
+
+One file (`config/world.yaml`) describes it. Metres and degrees in the apartment frame, z up (`contract.md` sections
+4 and 7); only the robot's pose is in the map frame. What a camera *believes* about itself is in its own
+configuration, not here. How the world looks is in `camera/solids.py` and `camera/textures.py`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from math import asin, atan2, degrees, hypot
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import yaml
+from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, field_validator, model_validator
+
+from services.errors import ConfigError
+from services.section import Section
+from services.vision.frames import (
+    Array,
+    Kind,
+    Mount,
+    Transform,
+    base_in_apartment,
+    camera_in_apartment,
+    rotation_x,
+    rotation_z,
+)
+
+XY = tuple[float, float]
+XYZ = tuple[float, float, float]
+
+
+class Room(Section):
+    """A part of the apartment; `polygon` holds its corners, in order. Open areas have edges without a wall."""
+
+    label: str
+    polygon: tuple[XY, ...] = Field(min_length=3)
+
+
+class Opening(Section):
+    """A gap in a wall; `at` is where it begins, metres along the wall from its start."""
+
+    at: float = Field(ge=0)
+    width: PositiveFloat
+    bottom: float = Field(default=0.0, ge=0)
+    top: PositiveFloat = 2.05
+    filled: Literal["nothing", "glass", "door"] = "nothing"
+
+
+class Wall(Section):
+    """A wall standing on the line from `start` to `end`; its openings are doors, windows and passages."""
+
+    start: XY
+    end: XY
+    height: PositiveFloat = 2.6
+    thickness: PositiveFloat = 0.1
+    openings: tuple[Opening, ...] = ()
+
+    @property
+    def length(self) -> float:
+        return hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
+
+    @model_validator(mode="after")
+    def openings_follow_each_other(self) -> Wall:
+        edges = [0.0]
+        for opening in self.openings:
+            edges += [opening.at, opening.at + opening.width]
+        if any(b < a for a, b in zip(edges, [*edges[1:], self.length], strict=True)):
+            raise ValueError(f"expected openings in order, apart, and inside {self.length:.2f} m, got {edges[1:]}")
+        return self
+
+
+class Furniture(Section):
+    """A box: centre, size along its own x and y, height, `z` of its underside; `kind` is its look.
+
+    At `yaw_deg` 0 its front faces -y (south) and its x runs along that front.
+    """
+
+    label: str
+    room: str
+    kind: str = "cupboard"
+    x: float
+    y: float
+    size: tuple[PositiveFloat, PositiveFloat]
+    height: PositiveFloat
+    z: float = Field(default=0.0, ge=0)
+    yaw_deg: float = 0.0
+
+
+class Marker(Section):
+    """A printed marker. `position` is its centre; `facing` is `up` or the azimuth (degrees) that its print faces.
+
+    At `spin_deg` 0 the marker's x is the apartment's x (facing up), its y is up (on a wall); a growing spin turns
+    it counter-clockwise, seen from the front.
+    """
+
+    id: int = Field(ge=0)
+    dictionary: Literal["DICT_5X5_1000"] = "DICT_5X5_1000"
+    size: PositiveFloat  # m, side of the black square
+    position: XYZ
+    facing: Literal["up"] | float = "up"
+    spin_deg: float = 0.0
+    where: str  # label of the furniture that it lies on or hangs at
+    room: str
+    place: str  # the camera's place that shows it best
+
+    @property
+    def pose(self) -> Transform:
+        """`T_AM`: the marker (x right, y up, z out of the print) in the apartment."""
+        upright = np.eye(3)
+        if self.facing != "up":
+            upright = rotation_z(self.facing + 90.0) @ rotation_x(90.0)
+        return Transform(upright @ rotation_z(self.spin_deg), np.array(self.position, float))
+
+
+class Lens(Section):
+    """The true lens of the upright picture at the widest zoom: pixels, and distortion k1 k2 p1 p2 k3 as in OpenCV."""
+
+    width: PositiveInt
+    height: PositiveInt
+    fx: PositiveFloat
+    fy: PositiveFloat
+    cx: float
+    cy: float
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class TrueMount(Section):
+    """How the camera really hangs; the fields are those of `vision.frames.Mount`."""
+
+    position: XYZ
+    kind: Kind = "ceiling"
+    yaw_deg: float = 0.0
+    lean_deg: XY = (0.0, 0.0)
+    pan_to_tilt_m: XY = (0.0, 0.0)
+    tilt_to_lens_m: XY = (0.0, 0.0)
+    sensor_roll_deg: float = 0.0
+
+    @property
+    def frames(self) -> Mount:
+        return Mount(**self.model_dump())
+
+
+class Place(Section):
+    """A place as the camera remembers it: the number of its preset and the point that it looks at."""
+
+    preset: PositiveInt
+    looks_at: XYZ
+
+
+class WorldCamera(Section):
+    """A camera as it is: mount, lens, limits (degrees, as it reads them) and what it has stored."""
+
+    mount: TrueMount
+    lens: Lens
+    pan_dead_arc: XY = (179.0, 186.0)
+    tilt_range: XY = (-10.0, 108.0)
+    serial: str = "AMC0000000000001"
+    starts_at: XYZ = (0.0, 20.0, 0.0)  # pan, tilt, zoom after power-on
+    places: dict[str, Place] = Field(default_factory=dict)
+
+    def aim(self, point: XYZ) -> tuple[float, float]:
+        """The pan (0..360) and tilt readings at which the optical axis goes through a point of the apartment.
+
+        Closed form: the lens stays in the plane through the pan axis and the optical axis, so pan is the point's
+        azimuth in the base frame and tilt a right triangle in that plane.
+        """
+        mount = self.mount.frames
+        x, y, z = base_in_apartment(mount).inverse().apply(np.array(point, float))
+        forward, away = mount.pan_to_tilt_m
+        out, off = hypot(x, y) - forward, z - away
+        side = mount.tilt_to_lens_m[1] * (-1.0 if mount.kind == "ceiling" else 1.0)
+        tilt = atan2(off, out) - asin(side / hypot(out, off))
+        return degrees(atan2(y, x)) % 360.0, degrees(tilt)
+
+    def reaches(self, pan: float, tilt: float) -> bool:
+        """Whether the motors can stand at these readings."""
+        inside = self.pan_dead_arc[0] < pan % 360.0 < self.pan_dead_arc[1]
+        return not inside and self.tilt_range[0] <= tilt <= self.tilt_range[1]
+
+    def pose(self, pan: float, tilt: float) -> Transform:
+        """`T_AC` at these readings."""
+        return camera_in_apartment(self.mount.frames, pan, tilt)
+
+
+class Pose2D(Section):
+    """A place and a heading on the floor."""
+
+    x: float
+    y: float
+    yaw_deg: float = 0.0
+
+    @property
+    def transform(self) -> Transform:
+        return Transform(rotation_z(self.yaw_deg), np.array([self.x, self.y, 0.0]))
+
+
+class WorldRobot(Section):
+    """A robot; `pose` is in the map frame."""
+
+    pose: Pose2D
+
+
+class WorldMap(Section):
+    """The robot's map: metres per cell, its origin as in map_server, and the apartment frame's pose in the map."""
+
+    resolution: PositiveFloat = 0.05
+    origin: XYZ = (0.0, 0.0, 0.0)
+    apartment_to_map: Pose2D
+
+    def to_apartment(self, points: Array) -> Array:
+        """Points (n, 3) of the map frame in the apartment frame."""
+        return self.apartment_to_map.transform.inverse().apply(points)
+
+
+class World(Section):
+    """Everything that stands, hangs or lies in the apartment."""
+
+    rooms: dict[str, Room]
+    walls: tuple[Wall, ...]
+    furniture: tuple[Furniture, ...] = ()
+    markers: tuple[Marker, ...] = ()
+    cameras: dict[str, WorldCamera] = Field(default_factory=dict)
+    robots: dict[str, WorldRobot] = Field(default_factory=dict)
+    map: WorldMap
+
+    @field_validator("furniture")
+    @classmethod
+    def labels_are_unique(cls, furniture: tuple[Furniture, ...]) -> tuple[Furniture, ...]:
+        if twice := [label for label, n in Counter(f.label for f in furniture).items() if n > 1]:
+            raise ValueError(f"expected every label once, got {', '.join(map(repr, twice))} again")
+        return furniture
+
+    @model_validator(mode="after")
+    def hangs_together(self) -> World:
+        if faults := [*self._unknown_names(), *self._unreachable_places()]:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def _unknown_names(self) -> Iterator[str]:
+        pieces = {piece.label for piece in self.furniture}
+        places = {place for camera in self.cameras.values() for place in camera.places}
+        for index, piece in enumerate(self.furniture):
+            if piece.room not in self.rooms:
+                yield f"furniture.{index}.room: expected one of {', '.join(self.rooms)}, got {piece.room!r}"
+        for index, marker in enumerate(self.markers):
+            for field, known in (("room", set(self.rooms)), ("where", pieces), ("place", places)):
+                if (name := getattr(marker, field)) not in known:
+                    yield f"markers.{index}.{field}: expected one of {', '.join(sorted(known))}, got {name!r}"
+
+    def _unreachable_places(self) -> Iterator[str]:
+        for name, camera in self.cameras.items():
+            for label, place in camera.places.items():
+                pan, tilt = camera.aim(place.looks_at)
+                if not camera.reaches(pan, tilt):
+                    yield f"cameras.{name}.places.{label}: expected readings in reach, got {pan:.1f}, {tilt:.1f}"
+
+    def marker(self, marker_id: int) -> Marker:
+        """The marker with this id; KeyError when there is none."""
+        for marker in self.markers:
+            if marker.id == marker_id:
+                return marker
+        raise KeyError(marker_id)
+
+    def marker_pose(self, marker_id: int) -> Transform:
+        """`T_AM` of the marker with this id; KeyError when there is none."""
+        return self.marker(marker_id).pose
+
+
+def load(path: Path) -> World:
+    """Reads a world; ConfigError lists everything that is wrong with the file."""
+    try:
+        return World.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as fault:
+        raise ConfigError([f"{path}: {' '.join(str(fault).split())}"]) from fault
+    except ValidationError as fault:
+        raise ConfigError(f"{path}: {line}" for line in _lines(fault)) from fault
+
+
+def _lines(fault: ValidationError) -> Iterator[str]:
+    for error in fault.errors():
+        where = ".".join(str(part) for part in error["loc"])
+        text = error["msg"].removeprefix("Value error, ")
+        got = "" if error["type"] in ("missing", "value_error") else f", got {error['input']!r}"
+        yield from (f"{where}: {line}{got}" if where else line for line in text.splitlines())
