@@ -106,6 +106,16 @@ def test_last_values_and_last_diagnostics_are_the_newest_of_each(storage: Storag
     assert storage.last_diagnostics() == {"a": Diagnostic("a", T0 + 1, 2, "no answer", '{"x": 1}')}
 
 
+def test_sightings_of_a_marker_come_newest_first(storage: Storage) -> None:
+    sightings = [
+        Sighting("s1", "ip1", 582, "DICT_5X5_1000", "Kitchen", T0 + n, T0, 1.5, -2.0, 0.5, sx=0.01, frames=n, why="é")
+        for n in range(5)
+    ]
+    storage.write(Batch(rows=[*sightings, replace(sightings[0], marker=17, stamp=T0 + 99)]))
+    assert storage.sightings(582, 2) == [sightings[4], sightings[3]]
+    assert storage.sightings(1, 2) == []
+
+
 def test_a_scan_follows_its_states_until_it_has_ended(storage: Storage, database: Database) -> None:
     scan = Scan("s1", "ip1", "running", "582", "", T0, None, 1, 0)
     storage.write(Batch(rows=[scan, replace(scan, frames_taken=5, started=T0 + 7)]))
