@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
 from threading import Timer
 from time import monotonic
@@ -39,8 +39,7 @@ class Flaky:
         os.kill(self.server.pid, signal.SIGKILL)
 
     def again(self) -> None:
-        with suppress(ChildProcessError):
-            self._stack.close()
+        self._stack.close()
         self.server = self._stack.enter_context(mariadb.private(self._folder))
 
 
