@@ -1,4 +1,4 @@
-"""The two databases that storage runs on, as one fixture sees them: fresh and empty, with a look inside by plain SQL."""
+"""The two databases that storage runs on: fresh and empty, and with a look inside by plain SQL."""
 
 from __future__ import annotations
 
@@ -92,8 +92,7 @@ def shown(row: tuple[Any, ...]) -> str:
 
 def _shown(value: object) -> str:
     if isinstance(value, datetime):
-        text = value.strftime("%H:%M:%S.%f").removesuffix("000").removesuffix(".000")
-        return text
+        return value.strftime("%H:%M:%S.%f").removesuffix("000").removesuffix(".000")
     if isinstance(value, float | Decimal):
         return f"{float(value):.6g}" if abs(value) < 1e6 else f"{float(value):.0f}"
     return str(value).removeprefix("2026-01-31 ")

@@ -18,7 +18,7 @@ from services.peers import free_port, program, running
 
 PACKAGE = "mariadb-server"
 SOCKET_LIMIT = 100  # a unix socket's path may have 107 bytes
-SMALL = ("--innodb-log-file-size=16M", "--innodb-buffer-pool-size=64M", "--performance-schema=OFF", "--skip-log-bin")
+SMALL = ("--innodb-log-file-size=96M", "--innodb-buffer-pool-size=128M", "--performance-schema=OFF", "--skip-log-bin")
 SAFE = (
     "--innodb-flush-log-at-trx-commit=1",  # a commit is on the disk before it is answered
     "--innodb-doublewrite=ON",

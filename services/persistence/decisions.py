@@ -26,7 +26,7 @@ class Decisions:
         self._rules = strategies.rules(home)
         self._last: dict[str, strategies.Value] = {}
         self._levels: dict[str, tuple[int, str]] = {}  # of components: level and message
-        self._odd: set[str] = set()  # items that were told to have a value in another unit
+        self._odd: set[str] = set()  # items of which a value in another unit was told
 
     @property
     def restored(self) -> list[str]:
@@ -80,21 +80,21 @@ class Decisions:
         rule = self._rule(state.item)
         if not rule.stores:
             return
-        sample, odd = rows.sample(state, items[state.item].unit)
-        if not strategies.is_wanted(
-            rule, (sample.num, sample.text), self._last.get(state.item), retained=state.retained
-        ):
+        unit = items[state.item].unit
+        sample = rows.sample(state, unit)
+        value, last = (sample.num, sample.text), self._last.get(state.item)
+        if not strategies.is_wanted(rule, value, last, retained=state.retained):
             return
-        if odd:
-            self._count_odd(odd, state, items[state.item].unit)
-        self._last[state.item] = (sample.num, sample.text)
+        if not rows.fits(state, unit):
+            self._count_mismatch(state, unit)
+        self._last[state.item] = value
         batch.samples.append(sample)
 
-    def _count_odd(self, odd: str, state: State, unit: str | None) -> None:
-        self._counters[odd] += 1
+    def _count_mismatch(self, state: State, unit: str | None) -> None:
+        self._counters["unit_mismatch"] += 1
         if state.item not in self._odd:
             self._odd.add(state.item)
-            log.warning("%s: %.80r is kept as text, its numbers are in %s", state.item, state.text, unit or "no unit")
+            log.warning("%s: %.80r is kept as text, its numbers are in %s", state.item, state.text, unit)
 
     def _is_transition(self, row: Diagnostic) -> bool:
         changed = self._levels.get(row.component) != (row.level, row.message)

@@ -60,20 +60,16 @@ def _state(name: str, text: str, time: int, home: Home, *, retained: bool) -> St
     return State(name, kind, time, text, states.number(kind, text), unit, retained)
 
 
-def sample(state: State, unit: str | None) -> tuple[Sample, str]:
-    """The row of a state for an item whose numbers are in `unit`, and what is odd about it (`""`: nothing).
+def fits(state: State, unit: str | None) -> bool:
+    """Whether a state's number may stand among those of an item in `unit`."""
+    return not state.unit or not unit or state.unit == unit
 
-    A number in another unit is kept as the text that came, one that is not finite as UNDEF; both are counted under
-    the name given here.
-    """
-    num, text = state.num, None if state.kind in AS_NUMBER else state.text
-    if num is None:
-        return Sample(state.item, state.time, None, state.text), ""
-    if not math.isfinite(num):
-        return Sample(state.item, state.time, None, "UNDEF"), "not_finite"
-    if state.unit and unit and state.unit != unit:
-        return Sample(state.item, state.time, None, state.text), "unit_mismatch"
-    return Sample(state.item, state.time, num, text), ""
+
+def sample(state: State, unit: str | None) -> Sample:
+    """The row of a state for an item whose numbers are in `unit`; a number in another unit is kept as the text."""
+    if state.num is None or not fits(state, unit):
+        return Sample(state.item, state.time, None, state.text)
+    return Sample(state.item, state.time, state.num, None if state.kind in AS_NUMBER else state.text)
 
 
 def state_text(stored: Sample, unit: str | None) -> str:

@@ -31,7 +31,7 @@ from services.storage import Address, Batch, Row, Storage, open_storage, read_ad
 log = logging.getLogger(__name__)
 
 CLOCK_STEP_US = 1_000_000  # a clock that steps back more than this is told
-COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "not_finite", "clock_steps", "restored", "reconnects")
+COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "restored", "reconnects")
 
 
 class Config(Section):

@@ -37,15 +37,16 @@ DUPLICATE = {  # MariaDB assigns from left to right, so the column that decides 
 COLUMNS = {table: tuple(field.name for field in fields(row)) for row, table in TABLES.items()}
 MICROSECONDS = "CAST(UNIX_TIMESTAMP({})*1000000 AS SIGNED)"
 SAMPLE = f"i.name, {MICROSECONDS.format('s.time')}, s.num, s.text"
-# A join with the grouped maximum is 60 times faster here than a correlated one.
+# One look into the key per item. The usual join with the grouped maximum is as fast while the server's statistics
+# are fresh, and takes seconds while a table is filling up, when they are not.
 LAST_VALUES = (
-    f"SELECT {SAMPLE} FROM sample s JOIN (SELECT item_id, MAX(time) AS t FROM sample GROUP BY item_id) m "
-    "ON m.item_id=s.item_id AND m.t=s.time JOIN item i ON i.item_id=s.item_id"
+    f"SELECT STRAIGHT_JOIN {SAMPLE} FROM item i JOIN sample s ON s.item_id=i.item_id AND s.time="
+    "(SELECT x.time FROM sample x WHERE x.item_id=i.item_id ORDER BY x.time DESC LIMIT 1)"
 )
 LAST_DIAGNOSTICS = (
-    f"SELECT d.component, {MICROSECONDS.format('d.time')}, d.level, d.message, d.details FROM diagnostic d "
-    "JOIN (SELECT component, MAX(time) AS t FROM diagnostic GROUP BY component) m "
-    "ON m.component=d.component AND m.t=d.time"
+    f"SELECT STRAIGHT_JOIN d.component, {MICROSECONDS.format('d.time')}, d.level, d.message, d.details "
+    "FROM (SELECT DISTINCT component FROM diagnostic) c JOIN diagnostic d ON d.component=c.component AND d.time="
+    "(SELECT x.time FROM diagnostic x WHERE x.component=c.component ORDER BY x.time DESC LIMIT 1)"
 )
 
 

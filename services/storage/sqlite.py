@@ -46,10 +46,8 @@ LAST_VALUES = (
     f"{SAMPLE} CROSS JOIN sample s ON s.item_id=i.item_id "
     "AND s.time=(SELECT MAX(time) FROM sample m WHERE m.item_id=i.item_id)"
 )
-LAST_DIAGNOSTICS = (
-    "SELECT component, time, level, message, details FROM diagnostic d "
-    "WHERE time=(SELECT MAX(time) FROM diagnostic m WHERE m.component=d.component)"
-)
+# The other columns are those of the row with the maximum: a promise of SQLite alone.
+LAST_DIAGNOSTICS = "SELECT component, MAX(time), level, message, details FROM diagnostic GROUP BY component"
 
 
 @contextmanager

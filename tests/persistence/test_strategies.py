@@ -1,0 +1,88 @@
+"""When a state is stored, as a table; and who gets its last state back."""
+
+from __future__ import annotations
+
+import pytest
+
+from services.home import Home, Item
+from services.persistence import strategies
+from services.persistence.strategies import Restore, Value
+
+CHANGE, UPDATE, NONE = ("everyChange",), ("everyUpdate",), ()
+ON: Value = (1.0, "ON")
+OFF: Value = (0.0, "OFF")
+UNDEF: Value = (None, "UNDEF")
+
+WANTED = [
+    # strategies, what came, what was last, retained, stored
+    (CHANGE, ON, None, False, True),
+    (CHANGE, ON, OFF, False, True),
+    (CHANGE, ON, ON, False, False),
+    (CHANGE, UNDEF, ON, False, True),
+    (CHANGE, UNDEF, UNDEF, False, False),
+    (CHANGE, (21.5, None), (21.5, None), False, False),
+    (CHANGE, (50.0, "120,100,50"), (50.0, "240,100,50"), False, True),
+    (UPDATE, ON, ON, False, True),
+    (UPDATE, ON, OFF, False, True),
+    ((*CHANGE, *UPDATE), ON, OFF, False, True),
+    ((*CHANGE, *UPDATE), ON, ON, False, True),
+    (NONE, ON, OFF, False, False),
+    (("restoreOnStartup",), ON, OFF, False, False),
+    # the broker's snapshot at a (re)connect
+    (CHANGE, ON, ON, True, False),
+    (UPDATE, ON, ON, True, False),
+    (UPDATE, ON, OFF, True, True),
+    (UPDATE, ON, None, True, True),
+    (NONE, ON, None, True, False),
+]
+
+
+@pytest.mark.parametrize(("names", "value", "last", "retained", "stored"), WANTED)
+def test_a_state_is_stored_as_its_strategies_say(
+    names: tuple[str, ...], value: Value, last: Value | None, retained: bool, stored: bool
+) -> None:
+    assert strategies.is_wanted(strategies.rule(names), value, last, retained=retained) is stored
+
+
+def test_strategies_that_nobody_knows_are_told() -> None:
+    home = Home(items={"Light": Item(type="Switch", label="Light", persist=("everyChange", "everyMoon"))})
+    assert list(strategies.faults(home)) == [
+        "items.Light.persist: expected of everyChange, everyUpdate, restoreOnStartup, got 'everyMoon'"
+    ]
+
+
+class TestRestore:
+    def test_it_waits_for_the_first_message_and_then_a_while(self) -> None:
+        restore = Restore(["Light"], 2.0)
+        assert restore.due is None
+        assert restore.missing(1e9) == []
+        restore.begin(100.0)
+        restore.begin(101.0)
+        assert restore.due == 102.0
+        assert restore.missing(101.9) == []
+        assert restore.missing(102.0) == ["Light"]
+
+    def test_it_happens_once(self) -> None:
+        restore = Restore(["Light"], 2.0)
+        restore.begin(0.0)
+        assert restore.missing(2.0) == ["Light"]
+        restore.begin(3.0)
+        assert restore.due is None
+        assert restore.missing(9.0) == []
+
+    def test_items_that_the_broker_has_are_left_alone(self) -> None:
+        restore = Restore(["Light", "Door"], 2.0)
+        restore.begin(0.0)
+        assert not restore.saw("Light", "ON")
+        assert restore.missing(2.0) == ["Door"]
+
+    def test_the_echo_of_a_restored_state_is_known_once(self) -> None:
+        restore = Restore(["Light"], 0.0)
+        restore.says("Light", "ON")
+        assert restore.saw("Light", "ON")
+        assert not restore.saw("Light", "ON")
+
+    def test_another_state_is_no_echo(self) -> None:
+        restore = Restore(["Light"], 0.0)
+        restore.says("Light", "ON")
+        assert not restore.saw("Light", "OFF")
