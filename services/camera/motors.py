@@ -128,8 +128,8 @@ class Motors:
     def _end(self, state: OrderState, error: str | None, now: float, *, clamped: bool = False) -> None:
         jobs, self.jobs, self.hold = self.jobs, [], None
         for job in jobs:
+            self.ended(job, state, error, now)  # first: who hears that a scan is done has heard its results
             self.answers.tell(job, state, error, clamped=clamped)
-            self.ended(job, state, error, now)
 
     def _cancel(self, why: str, now: float) -> None:
         """Ends what runs or waits, with a stop where there may be motion."""
