@@ -92,8 +92,9 @@ class Supervisor:
     def _read(self, child: Child, process: subprocess.Popen[str]) -> None:
         """A thread's body: passes on what the child prints, and that it ended."""
         assert process.stdout is not None
-        for line in process.stdout:
-            self._news.put(("line", child, line))
+        with process.stdout as lines:
+            for line in lines:
+                self._news.put(("line", child, line))
         self._news.put(("ended", child, str(process.wait())))
 
     def _until_next_start(self) -> float:

@@ -55,8 +55,8 @@ def bus(flat: Simulated) -> Iterator[Client]:
 
 
 @pytest.fixture
-def shell(parts: Parts) -> Iterator[Shell]:
-    made = Shell(parts)
+def shell(parts: Parts, tmp_path: Path) -> Iterator[Shell]:
+    made = Shell(parts, tmp_path)
     yield made
     made.close()
 
@@ -64,11 +64,11 @@ def shell(parts: Parts) -> Iterator[Shell]:
 class Shell:
     """A person with the public clients."""
 
-    def __init__(self, parts: Parts) -> None:
-        self.parts = parts
+    def __init__(self, parts: Parts, folder: Path) -> None:
+        self.parts, self.folder = parts, folder
         assert parts.ros is not None
         self.environment = {**os.environ, **parts.ros.env, "PYTHONUNBUFFERED": "1"}
-        self.listening: list[subprocess.Popen[str]] = []
+        self.listening: list[subprocess.Popen[bytes]] = []
 
     def mosquitto_pub(self, *arguments: str) -> None:
         self._run(peers.program("mosquitto_pub", "mosquitto-clients"), "-p", str(self.parts.broker_port), *arguments)
@@ -103,41 +103,40 @@ class Shell:
 
     def close(self) -> None:
         for process in self.listening:
-            peers.end(process)  # type: ignore[arg-type]
-            assert process.stdout is not None
-            process.stdout.close()
+            peers.end(process)
 
     def _run(self, *command: str) -> None:
         subprocess.run(command, env=self.environment, check=True, timeout=60, capture_output=True)
 
     def _listen(self, *command: str) -> Heard:
-        process = subprocess.Popen(
-            command, env=self.environment, stdout=subprocess.PIPE, text=True, start_new_session=True
-        )
+        file = self.folder / f"heard-{len(self.listening)}"
+        with file.open("wb") as output:
+            process = subprocess.Popen(command, env=self.environment, stdout=output, start_new_session=True)
         self.listening.append(process)
-        return Heard(process)
+        return Heard(file)
 
 
 class Heard:
     """The growing output of a listening client."""
 
-    def __init__(self, process: subprocess.Popen[str]) -> None:
-        assert process.stdout is not None
-        os.set_blocking(process.stdout.fileno(), False)
-        self.stdout, self.text = process.stdout, ""
+    def __init__(self, file: Path) -> None:
+        self.file = file
 
     def until(self, pattern: str, timeout_s: float = 20.0) -> re.Match[str]:
         """Waits until the output matches; what came until then is in the failure."""
-        end = time.monotonic() + timeout_s
-        while not (found := re.search(pattern, self.text)):
-            assert time.monotonic() < end, f"no {pattern!r} within {timeout_s} s in:\n{self.text[-3000:]}"
-            peers.wait_until(self._more, f"output like {pattern!r}; so far:\n{self.text[-3000:]}", timeout_s)
-        return found
+        found: re.Match[str] | None = None
 
-    def _more(self) -> bool:
-        chunk = self.stdout.read()
-        self.text += chunk or ""
-        return bool(chunk)
+        def matches() -> bool:
+            nonlocal found
+            found = re.search(pattern, self.file.read_text(errors="replace"))
+            return found is not None
+
+        try:
+            peers.wait_until(matches, f"output like {pattern!r}", timeout_s)
+        except TimeoutError as error:
+            raise AssertionError(f"{error}; it was:\n{self.file.read_text(errors='replace')[-3000:]}") from error
+        assert found is not None
+        return found
 
 
 def eventually(what: Callable[[], Any], timeout_s: float = 15.0) -> Any:
