@@ -151,7 +151,7 @@ def random_cells(rng: np.random.Generator) -> np.ndarray:
 def test_squares_with_random_cells_are_rarely_a_target():
     """Chance alone makes one in some hundreds nearest to 582 and near enough; ten pictures hold about a thousand."""
     false = [d for seed in range(10) for d in detect(random_cells(np.random.default_rng(seed)), "DICT_5X5_1000", {582})]
-    assert len(false) <= 4
+    assert len(false) <= 2
 
 
 def test_unknown_dictionary_names_the_choices():
