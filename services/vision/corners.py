@@ -19,6 +19,7 @@ REACH_PX = (1.5, 3.0)  # and the least and most of that in pixels
 STEP_PX = 0.5  # along a profile
 PROFILES = (12, 64)  # least and most per side; about one for each pixel
 TUKEY = 4.685  # cut-off of the robust line in standard deviations (95 % efficient, Huber 1981)
+REWEIGHTINGS = 12  # of the robust line: a scratch over a tenth of a side is gone by then
 OFFSET_FLOOR_PX = 0.03  # spread of edge points below which none counts as an outlier
 FARTHEST_PX = 4.0  # a corner that walks farther than this from where it was found belongs to something else
 
@@ -38,7 +39,7 @@ def sample(grey: Picture, x: Array, y: Array) -> Array:
 
 
 def refine(grey: Picture, square: Array, modules: int) -> Array | None:
-    """The corners (4, 2) of a dark square on light ground, from roughly right ones; None where the edges are not.
+    """The corners (4, 2) of a dark square on light ground, from roughly right ones; None where no lines cross.
 
     `square` is clockwise in the picture; `modules` is the number of cells on its side, the border's included.
     """
@@ -73,12 +74,13 @@ def _edge_points(grey: Picture, square: Array, modules: int) -> tuple[Array, Arr
 def _lines(points: Array, strength: Array) -> tuple[Array, Array]:
     """A robust line through each row of points: a point on it (4, 2) and its direction (4, 2)."""
     weights = np.sqrt(strength)
-    for _ in range(4):
+    for _ in range(REWEIGHTINGS):
         total = np.maximum(weights.sum(axis=1), 1e-9)
         centre = np.einsum("ip,ipk->ik", weights, points) / total[:, None]
         spread = points - centre[:, None]
-        moments = np.einsum("ip,ipk,ipl->ikl", weights, spread, spread)
-        direction = np.linalg.eigh(moments)[1][:, :, 1]
+        (xx, xy), (_, yy) = np.einsum("ip,ipk,ipl->kli", weights, spread, spread)
+        angle = np.arctan2(2 * xy, xx - yy) / 2
+        direction = np.column_stack((np.cos(angle), np.sin(angle)))
         off = spread[..., 0] * direction[:, None, 1] - spread[..., 1] * direction[:, None, 0]
         sigma = np.maximum(1.4826 * np.median(np.abs(off), axis=1), OFFSET_FLOOR_PX)
         weights = np.sqrt(strength) * np.clip(1 - (off / (TUKEY * sigma[:, None])) ** 2, 0, None) ** 2

@@ -48,15 +48,24 @@ def detect(image: Picture, dictionary: str, targets: Collection[int] | None = No
     """Every marker of the dictionary (`DICT_5X5_1000`, ...) in the picture, or only the targets; best first.
 
     `image` is grey (h, w) or BGR (h, w, 3). A marker shown twice is returned twice. When targets are given and one
-    is missing, a slower look for small and dark ones follows. ValueError for an unknown dictionary or picture shape.
+    is missing, a slower look for small and dark ones follows. ValueError for an unknown dictionary, a target that
+    is not in it, or another kind of picture.
     """
     book, grey = _book(dictionary), _grey(image)
+    wanted = None if targets is None else _known(targets, book, dictionary)
     found: list[Detection] = []
-    for look in (_plainly, _closely):
-        found = _distinct([*found, *_read(grey, look(grey, dictionary), book, targets)])
-        if targets is None or set(targets) <= {d.marker for d in found}:
+    for look in (_squares, _closely):
+        found = _distinct([*found, *_read(grey, look(grey, dictionary), book, wanted)])
+        if wanted is None or wanted <= {d.marker for d in found}:
             break
     return found
+
+
+def _known(targets: Collection[int], book: _Book, dictionary: str) -> frozenset[int]:
+    ids = range(len(book.codes) // 4)
+    if not all(target in ids for target in targets):
+        raise ValueError(f"targets: expected ids 0 to {ids[-1]} of {dictionary}, got {sorted(targets)}")
+    return frozenset(targets)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +98,8 @@ def _predefined(dictionary: str) -> Any:
 
 def _normalised(rows: NDArray[Any]) -> NDArray[Any]:
     centred = rows - rows.mean(axis=1, keepdims=True)
-    return centred / np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), 1e-6)
+    normalised: NDArray[Any] = centred / np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), 1e-6)
+    return normalised
 
 
 def _grey(image: Picture) -> Picture:
@@ -98,19 +108,15 @@ def _grey(image: Picture) -> Picture:
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
 
 
-def _plainly(grey: Picture, dictionary: str) -> Array:
-    """Squares in the picture as it is, (n, 4, 2)."""
-    return _squares(grey, dictionary)
-
-
 def _closely(grey: Picture, dictionary: str) -> Array:
-    """Squares in the picture with its contrast evened out and enlarged twice: small and dark ones."""
+    """Squares (n, 4, 2) in the picture with its contrast evened out and enlarged twice: small and dark ones."""
     even = cv2.createCLAHE(clipLimit=2.0, tileGridSize=(8, 8)).apply(grey)
     twice = cv2.resize(even, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
     return (_squares(np.asarray(twice, np.uint8), dictionary, enlarged=2) + 0.5) / 2 - 0.5
 
 
 def _squares(grey: Picture, dictionary: str, enlarged: int = 1) -> Array:
+    """Squares (n, 4, 2) in the picture as it is, roughly, clockwise; nested and doubled ones too."""
     detector = _detector(dictionary, max(grey.shape), enlarged)
     accepted, _, rejected = detector.detectMarkers(grey)
     squares = [np.asarray(square, float).reshape(4, 2) for square in (*accepted, *rejected)]
@@ -127,7 +133,7 @@ def _detector(dictionary: str, longest_px: int, enlarged: int) -> Any:
     return cv2.aruco.ArucoDetector(_predefined(dictionary), wanted)
 
 
-def _read(grey: Picture, squares: Array, book: _Book, targets: Collection[int] | None) -> list[Detection]:
+def _read(grey: Picture, squares: Array, book: _Book, targets: frozenset[int] | None) -> list[Detection]:
     """Decodes the squares twice: roughly, to drop nearly all of them, and again with exact corners."""
     every = np.arange(len(book.codes))
     wanted = every if targets is None else np.array([4 * marker + k for marker in targets for k in range(4)], int)
@@ -149,7 +155,7 @@ def _decode(grey: Picture, corners: Array, book: _Book, rows: NDArray[np.intp]) 
     return Detection(marker, np.roll(corners, -turns, axis=0), float(np.clip(match.correlation[0], 0, 1)))
 
 
-def _accepted(detection: Detection, targets: Collection[int] | None) -> bool:
+def _accepted(detection: Detection, targets: frozenset[int] | None) -> bool:
     if targets is None:
         return detection.confidence >= ANY_CORRELATION
     return detection.marker in targets and detection.confidence >= TARGET_CORRELATION
@@ -192,7 +198,8 @@ def _cells(grey: Picture, squares: Array, modules: int) -> Array:
     across, down = np.meshgrid(spots, spots)
     x, y = _place(squares, across.ravel(), down.ravel())
     count = len(CELL_SPOTS)
-    return sample(grey, x, y).reshape(-1, modules, count, modules, count).mean(axis=(2, 4))
+    means: Array = sample(grey, x, y).reshape(-1, modules, count, modules, count).mean(axis=(2, 4))
+    return means
 
 
 def _place(squares: Array, u: Array, v: Array) -> tuple[Array, Array]:

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 COEFFICIENTS = {"plumb_bob": 5, "rational_polynomial": 8}
 ASPECT_TOLERANCE = 0.01  # 1920x1080 for 2304x1296 is exact; streams rounded to whole macroblocks are within this
 NEWTON_STEPS = 12  # four are enough inside the picture, the rest is for rays at the edge of a strong barrel
+CONVERGED = 1e-10  # length of a last step
 STEP = 1e-6  # of the difference quotient, in normalised coordinates
 MISS = 1e-6  # a ray that does not lead back to its pixel to within this (a thousandth of a pixel) is none
 
@@ -73,8 +74,12 @@ class Lens:
         rays = goal.copy()
         with np.errstate(all="ignore"):
             for _ in range(NEWTON_STEPS):
-                rays = rays - self._newton_step(rays, goal)
+                step = self._newton_step(rays, goal)
+                rays = rays - step
+                if not (np.abs(step) > CONVERGED).any():
+                    break
             reached = np.abs(self._distort(rays) - goal).max(axis=1) < MISS
+            reached &= (rays * goal).sum(axis=1) > -MISS  # not by the far branch of a folded polynomial
         return np.where(reached[:, None], rays, np.nan)
 
     def project(self, points_c: Array) -> Array:
@@ -94,10 +99,11 @@ class Lens:
 
     def _newton_step(self, rays: Array, goal: Array) -> Array:
         here = self._distort(rays)
-        a, c = ((self._distort(rays + (STEP, 0)) - here) / STEP).T
-        b, d = ((self._distort(rays + (0, STEP)) - here) / STEP).T
+        a, c = ((self._distort(rays + np.array([STEP, 0.0])) - here) / STEP).T
+        b, d = ((self._distort(rays + np.array([0.0, STEP])) - here) / STEP).T
         x, y = (here - goal).T
-        return np.column_stack((d * x - b * y, a * y - c * x)) / (a * d - b * c)[:, None]
+        step: Array = np.column_stack((d * x - b * y, a * y - c * x)) / (a * d - b * c)[:, None]
+        return step
 
 
 def _numbers(content: Mapping[str, Any], key: str, count: int) -> Array:

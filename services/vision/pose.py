@@ -32,6 +32,8 @@ CANDIDATES = 4  # orientations worth refining; two are the rule, more come from 
 WRONG_BY_RATIO = ((0.05, 0.15, 0.25, 0.4, 0.6, 0.85, 1.0), (0.004, 0.02, 0.06, 0.11, 0.21, 0.39, 0.5))
 SINGLE_VIEW_FREEDOM = 2  # eight numbers measured, six of the pose
 REFINEMENTS, NUDGE, LONGEST_STEP = 8, 1e-5, 0.3  # steps at most; of the difference quotient and the longest, rad
+# IPPE_SQUARE returns no rotation for a square exactly parallel to the picture; a thousandth of a pixel off, it does.
+OFF_PARALLEL = 1e-6 * np.array([[0.3, -1.1], [-0.7, 0.4], [1.3, 0.9], [-0.2, 0.6]])
 SQUARE = np.array([[-0.5, 0.5, 0], [0.5, 0.5, 0], [0.5, -0.5, 0], [-0.5, -0.5, 0]])  # side 1, order of the corners
 
 
@@ -70,7 +72,7 @@ def locate(views: Sequence[View]) -> Located:
     ValueError without views, and when no marker whose face is turned to every lens explains them (mirrored corners).
     """
     sights = _gather(views)
-    ranked = _ranked(sights)
+    ranked = _ranked(sights) if np.isfinite(sights.rays).all() else []
     if not ranked:
         raise ValueError("expected clockwise corners of squares turned to the camera: no pose explains them")
     position, covariance = _fused(sights, ranked[0].places)
@@ -99,15 +101,15 @@ def _gather(views: Sequence[View]) -> _Sights:
         else:
             known.append(view)
     first = [place[0] for place in places]
+    corners = [np.mean([view.corners for view in place], axis=0) for place in places]
+    noise_px = [hypot(RANDOM_PX / sqrt(len(place)), FIXED_PX) for place in places]
     return _Sights(
-        np.array(
-            [v.lens.rays(np.mean([w.corners for w in place], axis=0)) for v, place in zip(first, places, strict=True)]
-        ),
-        np.array([v.camera.rotation for v in first]),
-        np.array([v.camera.translation for v in first]),
-        np.array([v.size_m for v in first]),
-        np.array([hypot(RANDOM_PX / sqrt(len(place)), FIXED_PX) / place[0].lens.focal for place in places]),
-        np.radians([v.angle_noise_deg for v in first]),
+        rays=np.array([v.lens.rays(c) for v, c in zip(first, corners, strict=True)]).reshape(-1, 4, 2),
+        rotation=np.array([v.camera.rotation for v in first]).reshape(-1, 3, 3),
+        lens_at=np.array([v.camera.translation for v in first]).reshape(-1, 3),
+        size=np.array([v.size_m for v in first], float),
+        noise=np.array([n / v.lens.focal for n, v in zip(noise_px, first, strict=True)], float),
+        angle_noise=np.radians([v.angle_noise_deg for v in first]),
     )
 
 
@@ -159,10 +161,9 @@ def _different(hypotheses: Sequence[_Hypothesis]) -> list[_Hypothesis]:
 def _orientations(sights: _Sights) -> Iterable[Array]:
     """Both orientations that each sight on its own allows, in the apartment."""
     for rays, size, rotation in zip(sights.rays, sights.size, sights.rotation, strict=True):
-        if np.isfinite(rays).all():
-            flags = cv2.SOLVEPNP_IPPE_SQUARE
-            _, turns, _, _ = cv2.solvePnPGeneric(SQUARE * size, rays, np.eye(3), np.zeros(5), flags=flags)
-            yield from (rotation @ cv2.Rodrigues(turn)[0] for turn in turns)
+        flags = cv2.SOLVEPNP_IPPE_SQUARE
+        _, turns, _, _ = cv2.solvePnPGeneric(SQUARE * size, rays + OFF_PARALLEL, np.eye(3), np.zeros(5), flags=flags)
+        yield from (rotation @ _turn(np.asarray(turn, float)) for turn in turns)
 
 
 def _explain(sights: _Sights, orientation: Array) -> _Hypothesis:
@@ -171,12 +172,9 @@ def _explain(sights: _Sights, orientation: Array) -> _Hypothesis:
     The translations are free because the readings of two places disagree by far more than the corners' noise.
     """
     spread = np.einsum("gji,jk,gck->gci", sights.rotation, orientation, SQUARE * sights.size[:, None, None])
-    system = np.zeros((len(sights.size), 4, 2, 3))
-    system[..., 0, 0] = system[..., 1, 1] = 1.0
-    system[..., 2] = -sights.rays
-    system = system.reshape(-1, 8, 3)
+    system = np.concatenate((np.broadcast_to(np.eye(2), (*sights.rays.shape, 2)), -sights.rays[..., None]), axis=-1)
     shift = (sights.rays * spread[..., 2:] - spread[..., :2]).reshape(-1, 8)
-    centre = np.einsum("gij,gj->gi", np.linalg.pinv(system), shift)
+    centre = np.einsum("gij,gj->gi", np.linalg.pinv(system.reshape(-1, 8, 3)), shift)
     corners = spread + centre[:, None]
     with np.errstate(all="ignore"):
         residuals = (corners[..., :2] / corners[..., 2:] - sights.rays) / sights.noise[:, None, None]
@@ -190,9 +188,9 @@ def _refined(sights: _Sights, start: _Hypothesis) -> _Hypothesis:
     """The nearest orientation with the least residuals over all sights (Gauss-Newton over the three angles)."""
     best = start
     for _ in range(REFINEMENTS):
-        nudged = [_explain(sights, best.orientation @ _turn(axis * NUDGE)).residuals for axis in np.eye(3)]
+        nudged = [_explain(sights, best.orientation @ _turn(axis)).residuals for axis in NUDGE * np.eye(3)]
         slope = (np.array(nudged) - best.residuals).T / NUDGE
-        step = -np.linalg.lstsq(slope, best.residuals, rcond=1e-6)[0]
+        step = np.asarray(np.linalg.lstsq(slope, -best.residuals, rcond=1e-6)[0], float)
         step *= min(1.0, LONGEST_STEP / max(float(np.linalg.norm(step)), 1e-12))
         tried = _explain(sights, best.orientation @ _turn(step))
         if not tried.possible or tried.cost >= best.cost:

@@ -25,7 +25,7 @@ LIGHT, DARK, WALL = 205.0, 35.0, 120.0
 
 @dataclass(frozen=True)
 class Print:
-    """A marker with a white rim of one cell: `size_m` is the black square's side, `pose` the marker in the apartment."""
+    """A marker with a white rim of one cell: the black square's side `size_m`, and its `pose` in the apartment."""
 
     marker: int
     dictionary: str
