@@ -61,7 +61,9 @@ def simulate(what: Annotated[str, typer.Argument(help="camera or home")], config
 
 
 @app.command(epilog="Example: apartment demo --once")
-def demo(once: Annotated[bool, typer.Option("--once", help="End by itself once the marker was found.")] = False) -> None:
+def demo(
+    once: Annotated[bool, typer.Option("--once", help="End by itself once the marker was found.")] = False,
+) -> None:
     """Run the whole apartment, simulated, and tell its story."""
     from services import demo as story  # it brings every service's libraries
 

@@ -59,6 +59,7 @@ class Simulated:
 @contextmanager
 def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
     """Starts the peers; they end with the block."""
+    folder.mkdir(parents=True, exist_ok=True)
     parts = Parts(folder)
     parts.environment["APARTMENT_STATE"] = str(folder / "state")
     parts.environment["APARTMENT_CAMERA_PORT"] = str(free_port())

@@ -217,9 +217,10 @@ def test_a_killed_service_is_back_within_three_seconds_and_nobody_else_notices(
     bus.payload(f"service/{name}/status", lambda text: text == "offline", 3.0)
     bus.payload(f"service/{name}/status", lambda text: text == "online", 3.0)
     assert time.monotonic() - killed < 3.0
-    assert {m.topic for m in bus.seen if m.topic.endswith("/status") and m.topic.startswith("service/")} == {
-        f"service/{name}/status"
+    noticed = {
+        m.topic for m in bus.seen if m.topic.startswith("service/") and m.topic.endswith("/status") and not m.retain
     }
+    assert noticed == {f"service/{name}/status"}
     assert {one: flat.supervisor.children[one].process.pid for one in others} == others  # type: ignore[union-attr]
     eventually(lambda: child.ready is not None)
 
@@ -263,7 +264,7 @@ def test_ten_thousand_messages_of_rubbish_stop_nobody_and_are_counted(flat: Simu
 def _counters(bus: Client, name: str, later_than: dict[str, float] | None = None) -> dict[str, float]:
     """What the service counts, from an info that is newer than all that was sent."""
     bus.forget()
-    enough = (later_than or {}).get("received", 0) + (500 if later_than else 0)
+    enough = (later_than or {}).get("received", 0) + (50 if later_than else 0)
     info = bus.payload(f"service/{name}/info", lambda info: info.counters["received"] >= enough, 30.0)
     return dict(info.counters)
 
@@ -308,8 +309,7 @@ def test_a_message_that_crashes_a_service_is_put_aside_and_the_service_goes_on(p
         bus.payload("home/Quotient/set", lambda text: text == "25")
         bus.say("home/Divisor/state", "0", retain=True)  # it comes again at every start
         bus.payload("service/operator/status", lambda text: text == "offline")
-        info = bus.payload("service/operator/info", lambda info: info.aside, 20.0)
-        assert info.counters["aside"] == 1
+        info = bus.payload("service/operator/info", lambda info: info.counters.get("aside") == 1, 20.0)
         bus.say("home/Divisor/state", "8")
         bus.payload("home/Quotient/set", lambda text: text == "12.5")
         bus.say("home/Divisor/state", "", retain=True)
@@ -319,9 +319,10 @@ def test_a_message_that_crashes_a_service_is_put_aside_and_the_service_goes_on(p
     assert "ZeroDivisionError" in record["traceback"]
 
 
-def test_sigterm_ends_every_process_within_five_seconds(parts: Parts, tmp_path: Path) -> None:
-    with services_of(tmp_path, parts) as running:
-        processes = [child.process for child in running.supervisor.children.values() if child.process]
-        started = time.monotonic()
-    assert time.monotonic() - started < 6.0
-    assert all(process.poll() is not None for process in processes)
+def test_sigterm_ends_every_process_within_five_seconds(tmp_path: Path) -> None:
+    with parts_of(tmp_path / "parts", real=False) as parts:
+        with services_of(tmp_path / "services", parts) as running:
+            processes = [child.process for child in running.supervisor.children.values() if child.process]
+            asked = time.monotonic()
+        assert time.monotonic() - asked < 5.0
+    assert [process.poll() for process in processes] == [0] * len(processes)
