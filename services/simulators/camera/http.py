@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from random import Random
+from socketserver import TCPServer
 from threading import Event, Lock
 from typing import Any
 
@@ -42,11 +43,19 @@ class Faults:
         return self.how
 
 
-class CameraServer(ThreadingHTTPServer):
-    """One camera's port: what all its connections share."""
+class Port(ThreadingHTTPServer):
+    """A port that asks no name server for its own name, and waits for its threads when it is closed."""
 
     daemon_threads = False
     request_queue_size = 64
+
+    def server_bind(self) -> None:
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
+
+
+class CameraServer(Port):
+    """One camera's port: what all its connections share."""
 
     def __init__(
         self, address: tuple[str, int], device: Device, door: Door, pictures: Pictures, clock: Callable[[], float]
