@@ -9,13 +9,15 @@ import re
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Literal
+from zoneinfo import ZoneInfo
 
 from pydantic import Field, field_validator, model_validator
 
 from services.section import Section
 from services.states import ITEM_TYPES, base_type
 
-NAME = r"^[A-Za-z_][A-Za-z0-9_]*$"
+NAME = r"[A-Za-z_][A-Za-z0-9_]*"
+NOT_A_NAME = "expected a name of letters, digits and _ that does not begin with a digit"
 GROUP_ROS = "ROS"  # the group whose members go to the robot, as in the report
 
 
@@ -48,7 +50,10 @@ class Thing(Section):
 
 
 class Item(Section):
-    """One item of OpenHAB. `unit` is OpenHAB's symbol, `range` is in that unit."""
+    """One item of OpenHAB. `unit` is OpenHAB's symbol, `range` is in that unit.
+
+    An item without a thing is OpenHAB's own: it holds what it is given. Without a room it is outside, or nowhere.
+    """
 
     type: str
     label: str
@@ -58,8 +63,9 @@ class Item(Section):
     unit: str | None = None
     icon: str | None = None
     range: Range | None = None
-    options: dict[str, str] = {}  # state -> what people read
+    options: dict[str, str] = Field(default={})  # state -> what people read
     read_only: bool = False
+    autoupdate: bool = True  # OpenHAB takes a command for the new state at once; else only the device's report counts
     ros: bool = True  # member of group ROS: on the robot's topics
     persist: tuple[str, ...] = ("everyChange", "restoreOnStartup")  # empty: never stored
 
@@ -79,22 +85,42 @@ class Item(Section):
 class Home(Section):
     """The whole home; names are OpenHAB item names and so the topics' `<item>`."""
 
-    rooms: dict[str, Room] = {}
-    things: dict[str, Thing] = {}
-    groups: dict[str, str] = {}  # name -> label
+    timezone: str = "UTC"  # of the IANA database, such as Europe/Madrid: the clock on the wall
+    rooms: dict[str, Room] = Field(default={})
+    things: dict[str, Thing] = Field(default={})
+    groups: dict[str, str] = Field(default={})  # name -> label
     items: dict[str, Item]
+
+    @field_validator("timezone")
+    @classmethod
+    def is_a_timezone(cls, text: str) -> str:
+        try:
+            ZoneInfo(text)
+        except (KeyError, ValueError, OSError) as error:
+            raise ValueError(f"expected a time zone such as Europe/Madrid, got {text!r}") from error
+        return text
+
+    @property
+    def zone(self) -> ZoneInfo:
+        """The time zone of the wall clock."""
+        return ZoneInfo(self.timezone)
 
     def faults(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """What refers to nothing: where (keys from the top of the file), and what is wrong."""
         for name, thing in self.things.items():
             if thing.room is not None and thing.room not in self.rooms:
                 yield ("things", name, "room"), f"expected one of the rooms, got {thing.room!r}"
+        for name in self.groups:
+            if not re.fullmatch(NAME, name):
+                yield ("groups", name), NOT_A_NAME
         for name, item in self.items.items():
             yield from self._item_faults(name, item)
 
     def _item_faults(self, name: str, item: Item) -> Iterator[tuple[tuple[str, ...], str]]:
-        if not re.match(NAME, name):
-            yield ("items", name), "expected a name of letters, digits and _ that does not begin with a digit"
+        if not re.fullmatch(NAME, name):
+            yield ("items", name), NOT_A_NAME
+        if name in self.groups or name == GROUP_ROS:
+            yield ("items", name), "expected a name that no group has"
         if item.thing is not None and item.thing not in self.things:
             yield ("items", name, "thing"), f"expected one of the things, got {item.thing!r}"
         if item.room is not None and item.room not in self.rooms:

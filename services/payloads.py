@@ -6,13 +6,13 @@ Times are ISO 8601 in UTC with milliseconds and `Z`; angles are degrees as the c
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, RootModel, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, RootModel, field_validator, model_validator
 
 OrderState = Literal["accepted", "running", "done", "failed", "refused", "cancelled"]
 Who = Literal["human", "mission", "scan"]
-Number = Field(allow_inf_nan=False)
+LARGEST = 1e300  # so that whoever takes a number may make a float of it
 
 
 def stamp(seconds: float) -> str:
@@ -23,7 +23,25 @@ def stamp(seconds: float) -> str:
 
 def seconds(text: str) -> float:
     """The reverse of `stamp`; any ISO 8601 text with an offset. ValueError when it is not one."""
-    return datetime.fromisoformat(text).timestamp()
+    when = datetime.fromisoformat(text)
+    if when.tzinfo is None:
+        raise ValueError(f"expected a time with an offset, such as Z, got {text!r}")
+    return when.timestamp()
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_finite(part) for part in value]
+    if isinstance(value, (int, float)) and not -LARGEST <= value <= LARGEST:
+        raise ValueError("expected finite numbers")
+    return value
+
+
+Free = Annotated[
+    Any, AfterValidator(_finite)
+]  # whatever JSON can say; pydantic's parser lets NaN and 1e999 into an Any
 
 
 class Payload(BaseModel):
@@ -63,7 +81,7 @@ class Order(Payload):
     A JSON object without a `value` is itself the value (`{"targets": [582]}` for Scan).
     """
 
-    value: Any = ""
+    value: Free = ""
     id: str | None = Field(default=None, max_length=64)
     by: Who = "human"
 
@@ -106,7 +124,7 @@ class OrderResult(Payload):
 
     id: str
     key: str
-    value: Any
+    value: Free
     state: OrderState
     error: str | None = None
     position: Position | None = None

@@ -1,17 +1,37 @@
-"""The turn: receive, handle, publish, tick, acknowledge."""
+"""The turn: receive, handle, publish, tick, acknowledge. It drives one service on one bus.
+
+What each error makes it do is said in `errors.py`; what is done about a message that crashes, in `aside.py`.
+Not here: processes and restarts (`supervisor.py`), the network (`bus/`).
+"""
 
 from __future__ import annotations
 
+import logging
+from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Protocol
 
-from services.bus import Message
+from services import __version__
+from services.aside import Aside
+from services.bus import Bus, Message
+from services.errors import BadMessage, DeviceError, Unavailable
+from services.payloads import Diagnostic, ServiceInfo, stamp
+from services.topics import DIAGNOSTICS, SERVICE_INFO
+
+INFO_EVERY_S = 5.0
+DIAGNOSTIC_EVERY_S = 1.0  # facts of diagnostic_aggregator: stale after 5 s without one
+PAUSE_S = 0.2  # while something we need is away
+WARN_FOR_S = 10.0  # how long a dropped message shows in the diagnostics
+LOGGED_PER_S = 5  # dropped messages with a line of their own; the rest is counted
 
 Post = Callable[[Message], None]
 
 
 class Service(Protocol):
-    """What the runner drives. All calls come from one thread; time comes in as `now`, seconds since 1970."""
+    """What the runner drives. All calls come from one thread; time comes in as `now`, seconds since 1970.
+
+    It may have `counters`, a mapping of texts to numbers, for `service/<service>/info`.
+    """
 
     subscribes: tuple[str, ...]
     due: float | None  # when tick is wanted next; None: only after a message
@@ -23,3 +43,139 @@ class Service(Protocol):
     def tick(self, now: float) -> Iterable[Message]:
         """Called at the end of every turn, whether `due` or not."""
         ...
+
+
+class Runner:
+    """Turns of one service. `turn` is called again and again, by `run_service` or by virtual time."""
+
+    def __init__(self, name: str, service: Service, bus: Bus, clock: Callable[[], float], aside: Aside) -> None:
+        self.name = name
+        self.service = service
+        self.bus = bus
+        self.clock = clock
+        self.aside = aside
+        self.log = logging.getLogger(f"services.run.{name}")
+        self.counters: Counter[str] = Counter()
+        self._started = clock()
+        self._batch: list[Message] = []  # of this turn; kept while it cannot be completed
+        self._handled = 0
+        self._waiting_for = ""
+        self._next_info = self._next_diagnostic = self._started
+        self._warned = (-WARN_FOR_S, "")
+        self._logged: tuple[int, int] = (0, 0)  # second, lines in it
+        bus.subscribe(service.subscribes)
+
+    @property
+    def due(self) -> float:
+        """When the next turn is wanted even if no message comes."""
+        own = min(self._next_info, self._next_diagnostic)
+        if self._waiting_for:
+            return min(own, self.clock() + PAUSE_S)
+        return own if self.service.due is None else min(own, self.service.due)
+
+    def turn(self, wait_s: float | None = 0.0) -> bool:
+        """One turn; waits up to `wait_s` for a message. True when there was something to do.
+
+        Anything but our own errors comes out of here after the message that caused it was noted: it is a bug.
+        """
+        if self._waiting_for:
+            self.bus.receive(wait_s, most=0)
+        else:
+            self._batch, self._handled = self.bus.receive(wait_s), 0
+        now = self.clock()
+        if not self._complete(now):
+            self._report(now)
+            return False
+        self.bus.ack(self._batch)
+        worked, self._batch = bool(self._batch), []
+        self._report(now)
+        return worked
+
+    def _complete(self, now: float) -> bool:
+        """Handles what is left of the batch and ticks; False when something we need is away."""
+        try:
+            for message in self._batch[self._handled :]:
+                self._one(message, now)
+                self._handled += 1
+            self._tick(now)
+        except Unavailable as error:
+            if not self._waiting_for:
+                self.log.warning("waiting: %s", error)
+            self._waiting_for = str(error) or "something we need"
+            self.counters["unavailable"] += 1
+            return False
+        if self._waiting_for:
+            self.log.info("going on, after waiting: %s", self._waiting_for)
+            self._waiting_for = ""
+        return True
+
+    def _one(self, message: Message, now: float) -> None:
+        self.counters["received"] += 1
+        if self.aside.holds(message):
+            self.counters["aside"] += 1
+            return
+        try:
+            self._publish(self.service.handle(message, now))
+        except BadMessage as error:
+            self._dropped("bad", str(error), now)
+        except DeviceError as error:
+            self._dropped("device_errors", f"{message.topic}: {error}", now)
+        except Unavailable:
+            raise
+        except BaseException:
+            if not message.topic.startswith("/"):  # what we posted ourselves is no message of the bus
+                self.aside.crashed(message, now)
+            raise
+
+    def _tick(self, now: float) -> None:
+        try:
+            self._publish(self.service.tick(now))
+        except DeviceError as error:
+            self._dropped("device_errors", str(error), now)
+
+    def _publish(self, messages: Iterable[Message]) -> None:
+        for message in messages or ():
+            self.counters["published"] += 1
+            self.bus.publish(message)
+
+    def _dropped(self, counter: str, text: str, now: float) -> None:
+        self.counters[counter] += 1
+        self._warned = (now, text)
+        second, lines = self._logged
+        if second != int(now):
+            second, lines = int(now), 0
+        self._logged = (second, lines + 1)
+        if lines < LOGGED_PER_S:
+            self.log.warning("dropped: %s", text)
+        elif lines == LOGGED_PER_S:
+            self.log.warning("dropped: more in this second, see the counters in service/%s/info", self.name)
+
+    def _report(self, now: float) -> None:
+        if now >= self._next_diagnostic:
+            self._next_diagnostic = now + DIAGNOSTIC_EVERY_S
+            self.bus.publish(DIAGNOSTICS.message(self._diagnostic(now), component=f"service/{self.name}"))
+        if now >= self._next_info:
+            self._next_info = now + INFO_EVERY_S
+            self.bus.publish(SERVICE_INFO.message(self.info(), service=self.name))
+
+    def info(self) -> ServiceInfo:
+        """What the service says of itself on `service/<service>/info`."""
+        counters: dict[str, float] = {
+            "received": 0, "published": 0, "bad": 0,
+            **self.counters,
+            **{str(name): float(value) for name, value in getattr(self.service, "counters", {}).items()},
+            "dropped": self.bus.dropped,
+            "connections": self.bus.connections,
+        }  # fmt: skip
+        return ServiceInfo(
+            version=__version__, started=stamp(self._started), counters=counters, aside=self.aside.names()
+        )
+
+    def _diagnostic(self, now: float) -> Diagnostic:
+        level, text = 0, "running"
+        if self._waiting_for:
+            level, text = 2, f"waiting: {self._waiting_for}"
+        elif now - self._warned[0] < WARN_FOR_S:
+            level, text = 1, f"dropped: {self._warned[1]}"
+        values = {name: str(self.counters[name]) for name in ("received", "published", "bad")}
+        return Diagnostic(level=level, message=text[:400], values=values, hardware_id=self.name)

@@ -5,8 +5,11 @@ Sources: openhab-core `library/types` and `library/items` (`toString`, accepted 
 
 from __future__ import annotations
 
+import math
 import re
-from datetime import datetime
+from datetime import UTC, datetime, tzinfo
+from decimal import Decimal
+from zoneinfo import ZoneInfo
 
 from services.errors import BadMessage
 
@@ -39,8 +42,15 @@ ITEM_TYPES = (
     "Call",
     "Image",
 )
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_QUANTITY = re.compile(rf"({_NUMBER.pattern})(?: ?(\S+))?")
+MILLIS_FROM_DIGITS = 12  # an epoch with fewer digits is in seconds, as DateTimeType reads it
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+# A unit begins with a letter or a sign such as % or °, not with a digit or a comma: `1.2.3` and `21,5` are no numbers.
+_QUANTITY = re.compile(rf"({_NUMBER.pattern})(?: ?([^\W\d_]\S*|[%°′″'\"]\S*))?")
+_DATE = r"[0-9]{4}-[0-9]{2}-[0-9]{2}"
+_TIME = r"[0-9]{2}:[0-9]{2}(?::[0-9]{2}(?:\.[0-9]{1,9})?)?"
+_ZONE = r" ?(?:(Z|[+-][0-9]{2}(?::?[0-9]{2})?)|([A-Z][A-Za-z_]+(?:/[A-Z][A-Za-z_]+)*))"
+_MOMENT = re.compile(rf"(?:({_DATE})(?:[T ]({_TIME}))?|({_TIME}))(?:{_ZONE})?")
+_EPOCH = re.compile(r"-?([0-9]{1,15})")
 
 
 def base_type(item_type: str) -> str:
@@ -54,7 +64,19 @@ def quantity(text: str) -> tuple[float, str]:
     if not match:
         raise BadMessage(f"expected a number, optionally with a unit, got {text[:80]!r}")
     unit = match.group(4) or ""
-    return float(match.group(1)), "" if unit == "one" else unit
+    return _finite(match.group(1)), "" if unit == "one" else unit
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise BadMessage(f"expected a number that fits 64 bits, got {text[:80]!r}")
+    return value
+
+
+def plain(value: float) -> str:
+    """A finite number as OpenHAB writes it: `21.5`, `21`, never with an exponent."""
+    return str(int(value)) if value.is_integer() else format(Decimal(repr(value)), "f")
 
 
 def parts(text: str, lowest: int, highest: int) -> list[float]:
@@ -62,7 +84,7 @@ def parts(text: str, lowest: int, highest: int) -> list[float]:
     fields = text.split(",")
     if not lowest <= len(fields) <= highest or not all(_NUMBER.fullmatch(part.strip()) for part in fields):
         raise BadMessage(f"expected {lowest} to {highest} numbers with commas between, got {text[:80]!r}")
-    return [float(part) for part in fields]
+    return [_finite(part) for part in fields]
 
 
 def color(text: str) -> tuple[float, float, float]:
@@ -74,19 +96,52 @@ def color(text: str) -> tuple[float, float, float]:
 
 
 def percent(text: str) -> float:
-    """A number from 0 to 100."""
+    """A number from 0 to 100, without a sign of percent: OpenHAB's PercentType has no unit."""
     value, unit = quantity(text)
-    if unit not in ("", "%") or not 0 <= value <= 100:
+    if unit or not 0 <= value <= 100:
         raise BadMessage(f"expected 0 to 100, got {text[:80]!r}")
     return value
 
 
-def moment(text: str) -> datetime:
-    """OpenHAB's DateTime, `2026-01-31T07:05:00.000+0100`, the colon in the offset optional."""
+def moment(text: str, zone: tzinfo | None = None) -> datetime:
+    """A time in any form that OpenHAB reads, such as its own `2026-01-31T07:05:00.000+0100`; always with an offset.
+
+    A text without one is in `zone` (None: this machine's); a time alone belongs to 1970-01-01, as in DateTimeType.
+    BadMessage when it is none of them, or no such time.
+    """
+    match = _MOMENT.fullmatch(text)
     try:
-        return datetime.fromisoformat(text)
-    except ValueError as error:
-        raise BadMessage(f"expected a time like 2026-01-31T07:05:00.000+0100, got {text[:80]!r}") from error
+        if _EPOCH.fullmatch(text):
+            return _from_epoch(int(text), zone)
+        if match:
+            date, time, only_time, offset, name = match.groups()
+            when = datetime.fromisoformat(f"{date or '1970-01-01'}T{time or only_time or '00:00'}{offset or ''}")
+            where = ZoneInfo(name) if name else zone
+            when = when if when.tzinfo else when.replace(tzinfo=where) if where else when.astimezone()
+            when.timestamp()
+            return when
+    except (ValueError, OverflowError, KeyError, OSError) as error:
+        raise BadMessage(f"expected a time that exists, got {text[:80]!r}: {error}") from error
+    raise BadMessage(f"expected a time like 2026-01-31T07:05:00.000+0100, got {text[:80]!r}")
+
+
+def _from_epoch(count: int, zone: tzinfo | None) -> datetime:
+    in_seconds = len(str(abs(count))) < MILLIS_FROM_DIGITS
+    return datetime.fromtimestamp(count if in_seconds else count / 1000, UTC).astimezone(zone)
+
+
+def moment_text(when: datetime) -> str:
+    """OpenHAB's own form of a time that has an offset: milliseconds, and the offset without a colon."""
+    if when.utcoffset() is None:
+        raise ValueError(f"expected a time with an offset, got {when}")
+    return when.replace(tzinfo=None).isoformat(timespec="milliseconds") + f"{when:%z}"[:5]
+
+
+def _microseconds(when: datetime) -> float:
+    try:
+        return when.timestamp() * 1e6
+    except (ValueError, OverflowError) as error:  # the first and last days of the calendar, without an offset
+        raise BadMessage(f"expected a time within the calendar, got {when.isoformat()}") from error
 
 
 def number(item_type: str, text: str) -> float | None:
@@ -109,7 +164,7 @@ def number(item_type: str, text: str) -> float | None:
     if kind == "Color":
         return color(text)[2]
     if kind == "DateTime":
-        return moment(text).timestamp() * 1e6
+        return _microseconds(moment(text))
     if kind == "Location":
         parts(text, 2, 3)
     return None

@@ -1,16 +1,13 @@
 """The table of topics: pattern, kind, payload, who writes and who reads, whether it is stored, what it means.
 
 `bus_topics.md`, the broker's ACL and every read and publish come from this table; nothing else spells a topic.
-The payload models are in `payloads.py`, OpenHAB's string forms in `states.py`.
+What a row is stands in `topic.py`, the payload models in `payloads.py`, OpenHAB's string forms in `states.py`.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from enum import Enum
-from functools import cached_property
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -18,81 +15,12 @@ from pydantic import BaseModel, ValidationError
 from services import payloads as p
 from services.bus import Message
 from services.errors import BadMessage
+from services.topic import STALE_AFTER_S, Kind, Topic
 
-STALE_AFTER_S = 5.0  # contract section 2: an older command is refused
+__all__ = ["BLOB_LIMIT", "TABLE", "TEXT_LIMIT", "Kind", "Read", "Topic", "find", "markdown", "read", "reply"]
+
 TEXT_LIMIT = 256 * 1024
 BLOB_LIMIT = 4 * 1024 * 1024
-
-
-class Kind(Enum):
-    """What a topic is for; it alone decides retain, QoS and expiry."""
-
-    STATE = "state"  # retained, the latest wins
-    EVENT = "event"  # happened, never retained
-    COMMAND = "command"  # wanted; never retained, refused when late
-    BLOB = "blob"  # a picture, QoS 0
-
-
-LEVELS = {
-    "item": r"[A-Za-z_][A-Za-z0-9_]*",
-    "cam": r"[a-z][a-z0-9_]*",
-    "robot": r"[a-z][a-z0-9_]*",
-    "service": r"[a-z0-9_-]+",
-    "key": r"[A-Za-z]+",
-    "marker": r"[0-9]{1,4}",
-    "component": r"[A-Za-z0-9_-]+(?:/[A-Za-z0-9_-]+)*",
-}
-
-
-@dataclass(frozen=True)
-class Topic:
-    """One row of the table. `writers` and `readers` are roles (`ROLES`); `<service>` and `<cam>` in a role name
-    stand for the level of that name, so that a service owns its own topics only."""
-
-    pattern: str
-    kind: Kind
-    payload: type[BaseModel] | type[str] | type[bytes]
-    writers: tuple[str, ...]
-    readers: tuple[str, ...]
-    meaning: str
-    stored: bool = False
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """The names of the levels that vary, in order."""
-        return tuple(re.findall(r"<(\w+)>", self.pattern))
-
-    @cached_property
-    def filter(self) -> str:
-        """The MQTT filter of all its topics."""
-        return re.sub(r"<\w+>", "+", self.pattern.replace("<component>", "#"))
-
-    @cached_property
-    def regex(self) -> re.Pattern[str]:
-        """Matches a whole topic; one group per level that varies."""
-        literal = re.sub(r"<(\w+)>", lambda m: f"(?P<{m[1]}>{LEVELS[m[1]]})", self.pattern)
-        return re.compile(literal)
-
-    def name(self, **levels: object) -> str:
-        """The topic with these levels; BadMessage when one of them is not what the pattern allows."""
-        topic = re.sub(r"<(\w+)>", lambda m: str(levels[m[1]]), self.pattern)
-        if not self.regex.fullmatch(topic):
-            raise BadMessage(f"{topic!r} is not a topic like {self.pattern}")
-        return topic
-
-    def message(self, payload: BaseModel | str | bytes, **levels: object) -> Message:
-        """The message that says `payload` there, with the flags of its kind."""
-        return Message(
-            topic=self.name(**levels),
-            payload=encode(payload),
-            retain=self.kind is Kind.STATE,
-            qos=0 if self.kind is Kind.BLOB else 1,
-            expires_s=int(STALE_AFTER_S) if self.kind in (Kind.COMMAND, Kind.BLOB) else None,
-        )
-
-    def filter_for(self, **levels: str) -> str:
-        """The filter with some levels given: `camera/ip1/order/+`."""
-        return re.sub(r"<(\w+)>", lambda m: levels.get(m[1], "#" if m[1] == "component" else "+"), self.pattern)
 
 
 @dataclass(frozen=True)
@@ -103,13 +31,6 @@ class Read:
     levels: dict[str, str]
     payload: Any
     message: Message = field(repr=False)
-
-
-def encode(payload: BaseModel | str | bytes) -> bytes:
-    """Bytes on the wire: JSON of a model, UTF-8 of a text."""
-    if isinstance(payload, BaseModel):
-        return payload.model_dump_json().encode()
-    return payload.encode() if isinstance(payload, str) else payload
 
 
 ALL = (
@@ -127,16 +48,25 @@ SHOWN = ("bridge", "persistence", "history", "mission", "dashboard", "operator")
 STEERS = ("bridge", "dashboard", "operator", "mission")
 
 HOME_STATE = Topic(
-    "home/<item>/state", Kind.STATE, str, ("openhab", "persistence"), (*SHOWN, "camera-<cam>"),
-    "the state of an item in OpenHAB's string form (`ON`, `21.5 °C`, `UNDEF`)", stored=True,
-)  # fmt: skip
+    "home/<item>/state",
+    Kind.STATE,
+    str,
+    ("openhab", "persistence"),
+    (*SHOWN, "camera-<cam>"),
+    "the state of an item in OpenHAB's string form (`ON`, `21.5 °C`, `UNDEF`)",
+    stored=True,
+)
 HOME_COMMAND = Topic(
-    "home/<item>/command", Kind.COMMAND, str, (*STEERS, "camera-<cam>"), ("openhab", "dashboard", "operator"),
+    "home/<item>/command",
+    Kind.COMMAND,
+    str,
+    (*STEERS, "camera-<cam>"),
+    ("openhab", "dashboard", "operator"),
     "sendCommand",
-)  # fmt: skip
+)
 HOME_SET = Topic(
     "home/<item>/set", Kind.COMMAND, str, (*STEERS, "camera-<cam>"), ("openhab", "dashboard", "operator"), "postUpdate"
-)  # fmt: skip
+)
 SERVICE_STATUS = Topic(
     "service/<service>/status",
     Kind.STATE,
@@ -149,40 +79,91 @@ SERVICE_INFO = Topic(
     "service/<service>/info", Kind.STATE, p.ServiceInfo, ("<service>",), SHOWN, "version, start and counters"
 )
 CAMERA_STATUS = Topic(
-    "camera/<cam>/status", Kind.STATE, p.CameraStatus, ("camera-<cam>",), SHOWN, "whether the camera can be used, and why not"
-)  # fmt: skip
+    "camera/<cam>/status",
+    Kind.STATE,
+    p.CameraStatus,
+    ("camera-<cam>",),
+    SHOWN,
+    "whether the camera can be used, and why not",
+)
 CAMERA_ORDER = Topic(
-    "camera/<cam>/order/<key>", Kind.COMMAND, p.Order, (*STEERS, "openhab"), ("camera-<cam>",),
+    "camera/<cam>/order/<key>",
+    Kind.COMMAND,
+    p.Order,
+    (*STEERS, "openhab"),
+    ("camera-<cam>",),
     "an order: plain text is the value and a human's, or JSON with `value`, `id`, `by`",
-)  # fmt: skip
+)
 CAMERA_ORDER_RESULT = Topic(
-    "camera/<cam>/order_result", Kind.EVENT, p.OrderResult, ("camera-<cam>",), (*SHOWN, "openhab"),
-    "what became of an order; also to the MQTT 5 response topic", stored=True,
-)  # fmt: skip
+    "camera/<cam>/order_result",
+    Kind.EVENT,
+    p.OrderResult,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "what became of an order; also to the MQTT 5 response topic",
+    stored=True,
+)
 CAMERA_POSITION = Topic(
-    "camera/<cam>/position", Kind.STATE, p.Position, ("camera-<cam>",), (*SHOWN, "openhab"), "where the camera looks, degrees as it reads them"
-)  # fmt: skip
+    "camera/<cam>/position",
+    Kind.STATE,
+    p.Position,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "where the camera looks, degrees as it reads them",
+)
 CAMERA_POSITION_SET = Topic(
-    "camera/<cam>/position/set", Kind.COMMAND, p.PositionSet, (*STEERS, "openhab"), ("camera-<cam>",), "look there; answered like an order, key `Position`"
-)  # fmt: skip
+    "camera/<cam>/position/set",
+    Kind.COMMAND,
+    p.PositionSet,
+    (*STEERS, "openhab"),
+    ("camera-<cam>",),
+    "look there; answered like an order, key `Position`",
+)
 CAMERA_PLACES = Topic(
     "camera/<cam>/places", Kind.STATE, p.Places, ("camera-<cam>",), (*SHOWN, "openhab"), "the named places"
 )
 CAMERA_MOTION = Topic(
-    "camera/<cam>/motion", Kind.STATE, p.Motion, ("camera-<cam>",), (*SHOWN, "openhab"), "1 for 15 s after motion, -1 when the alarm is in trouble"
-)  # fmt: skip
+    "camera/<cam>/motion",
+    Kind.STATE,
+    p.Motion,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "1 for 15 s after motion, -1 when the alarm is in trouble",
+)
 CAMERA_SCAN_STATE = Topic(
-    "camera/<cam>/scan/state", Kind.STATE, p.ScanState, ("camera-<cam>",), (*SHOWN, "openhab"), "how far a scan is", stored=True
-)  # fmt: skip
+    "camera/<cam>/scan/state",
+    Kind.STATE,
+    p.ScanState,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "how far a scan is",
+    stored=True,
+)
 CAMERA_SCAN_RESULT = Topic(
-    "camera/<cam>/scan/result", Kind.EVENT, p.ScanResult, ("camera-<cam>",), (*SHOWN, "openhab"), "a marker and where it is", stored=True
-)  # fmt: skip
+    "camera/<cam>/scan/result",
+    Kind.EVENT,
+    p.ScanResult,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "a marker and where it is",
+    stored=True,
+)
 CAMERA_MARKER = Topic(
-    "camera/<cam>/marker/<marker>", Kind.STATE, p.ScanResult, ("camera-<cam>",), (*SHOWN, "openhab"), "the newest scan result of that marker"
-)  # fmt: skip
+    "camera/<cam>/marker/<marker>",
+    Kind.STATE,
+    p.ScanResult,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "the newest scan result of that marker",
+)
 CAMERA_SCAN_IMAGE = Topic(
-    "camera/<cam>/scan/image", Kind.BLOB, bytes, ("camera-<cam>",), SHOWN, "an analysed frame as JPEG with the markers drawn, while ScanImgPub is on"
-)  # fmt: skip
+    "camera/<cam>/scan/image",
+    Kind.BLOB,
+    bytes,
+    ("camera-<cam>",),
+    SHOWN,
+    "an analysed frame as JPEG with the markers drawn, while ScanImgPub is on",
+)
 CAMERA_SNAPSHOT_GET = Topic(
     "camera/<cam>/snapshot/get",
     Kind.COMMAND,
@@ -193,11 +174,22 @@ CAMERA_SNAPSHOT_GET = Topic(
 )
 CAMERA_SNAPSHOT = Topic("camera/<cam>/snapshot", Kind.BLOB, bytes, ("camera-<cam>",), SHOWN, "a JPEG")
 CAMERA_STREAM = Topic(
-    "camera/<cam>/stream", Kind.STATE, p.Stream, ("camera-<cam>",), SHOWN, "which streams are on, and the address of ours"
-)  # fmt: skip
+    "camera/<cam>/stream",
+    Kind.STATE,
+    p.Stream,
+    ("camera-<cam>",),
+    SHOWN,
+    "which streams are on, and the address of ours",
+)
 DIAGNOSTICS = Topic(
-    "diagnostics/<component>", Kind.STATE, p.Diagnostic, ALL, SHOWN, "health of a component, about once a second", stored=True
-)  # fmt: skip
+    "diagnostics/<component>",
+    Kind.STATE,
+    p.Diagnostic,
+    ALL,
+    SHOWN,
+    "health of a component, about once a second",
+    stored=True,
+)
 
 TABLE: tuple[Topic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
 
@@ -239,7 +231,7 @@ def _payload(row: Topic, message: Message) -> Any:
         return p.Order(value=text)
     assert issubclass(row.payload, BaseModel)
     try:
-        return row.payload.model_validate_json(text)
+        return row.payload.model_validate_json(text, strict=True)
     except ValidationError as error:
         raise BadMessage(f"{message.topic}: {_first_fault(error)}") from error
 

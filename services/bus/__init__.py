@@ -1,7 +1,7 @@
 """The bus contract: what a message is, what a bus can do, and how topics match filters.
 
 Not here: the implementations, `memory.py` (in this process), `mqtt.py` (paho, any broker) and `embedded.py`
-(a broker in this process). One contract test, `tests/bus/test_contract.py`, runs against all of them.
+One contract test, `tests/bus/test_contract.py`, runs against all of them.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
+
+WAKE_TOPIC = "/bus/wake"  # posted to end a wait; no service sees it
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,7 @@ class Message:
     reply_to: str | None = None
     correlation: bytes | None = None
     expires_s: int | None = None  # MQTT 5 message expiry; None: never
+    once: bool = False  # a state of somebody else's topic (a restored one): not said again after a reconnect
     token: object = None  # what the bus needs to acknowledge this one
 
 
@@ -37,12 +40,20 @@ class Bus(Protocol):
 
     States (`retain`) are remembered and published again after every reconnect. While there is no connection
     events wait in a bounded queue (the oldest goes first when it is full, counted in `dropped`), and commands,
-    which have an expiry, are dropped and counted: a late command is worse than none.
+    which have an expiry, are dropped and counted: a late command is worse than none (`outbox.py`).
     """
 
-    connected: bool
     connections: int
-    dropped: int
+
+    @property
+    def connected(self) -> bool:
+        """Whether messages go out now."""
+        ...
+
+    @property
+    def dropped(self) -> int:
+        """How many messages could not be kept while there was no connection."""
+        ...
 
     def subscribe(self, filters: Sequence[str]) -> None:
         """Asks for everything that matches; restored after every reconnect."""
@@ -53,8 +64,13 @@ class Bus(Protocol):
     def post(self, message: Message) -> None:
         """Puts a local message (topic begins with `/`) into the inbox, from any thread."""
 
-    def receive(self, timeout: float | None) -> list[Message]:
-        """All that waits, in the order of arrival, at most a window; waits up to `timeout` s (None: for ever) for the first."""
+    def receive(self, timeout: float | None = 0.0, most: int = ...) -> list[Message]:
+        """All that waits, in the order of arrival, `most` at most; waits up to `timeout` s for the first.
+
+        `timeout` None waits for ever. It also keeps the bus going (reconnected: states are said again), so it is
+        called in every turn; `most=0` does that alone.
+        """
+        ...
 
     def ack(self, messages: Iterable[Message]) -> None:
         """Acknowledges; what came by an older connection is left to the broker, which sends it again."""

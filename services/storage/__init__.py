@@ -1,0 +1,201 @@
+"""Where samples, sightings, scans, orders and diagnostics are kept: one small contract, two databases behind it.
+
+Not here: which value is worth keeping (`services/persistence/`), and the SQL (`mysql.py`, `sqlite.py`; the tables
+are in `schema/`, one file per version). All times are whole microseconds since 1970, UTC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol
+
+from services.storage.address import Address, read_address
+
+__all__ = [
+    "Address", "Batch", "CameraOrder", "Diagnostic", "Item", "Row", "Sample", "Scan", "Sighting", "Storage",
+    "open_storage", "read_address",
+]  # fmt: skip
+BACKENDS = {"mysql": "services.storage.mysql", "sqlite": "services.storage.sqlite"}
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """An item as the database knows it; `kind` is the type without its dimension, `unit` that of all its numbers."""
+
+    name: str
+    kind: str
+    unit: str | None = None
+    item_id: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One stored state: a number, a text, or both (`kind.holds` says which one is the value)."""
+
+    item: str
+    time: int
+    num: float | None
+    text: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """A marker seen by a scan; `sx`, `sy`, `sz` are standard deviations in metres. Fields are the columns."""
+
+    scan: str
+    camera: str
+    marker: int
+    dictionary: str
+    place: str | None
+    stamp: int
+    first_seen: int | None = None
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
+    qx: float | None = None
+    qy: float | None = None
+    qz: float | None = None
+    qw: float | None = None
+    sx: float | None = None
+    sy: float | None = None
+    sz: float | None = None
+    distance: float | None = None
+    zoom: float | None = None
+    frames: int | None = None
+    mode: str | None = None
+    why: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """A scan; written at each of its states, and left alone once it has ended. Fields are the columns."""
+
+    scan: str
+    camera: str
+    state: str
+    targets: str
+    found: str
+    started: int
+    ended: int | None
+    frames_taken: int
+    frames_analysed: int
+
+
+@dataclass(frozen=True, slots=True)
+class CameraOrder:
+    """An order; written at each of its states, `at` is the time of the first. Fields are the columns."""
+
+    order_id: str
+    camera: str
+    name: str
+    value: str
+    state: str
+    error: str | None
+    at: int
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """A change of a component's level or message; `details` is JSON. Fields are the columns."""
+
+    component: str
+    time: int
+    level: int
+    message: str
+    details: str | None
+
+
+Row = Sighting | Scan | CameraOrder | Diagnostic
+TABLES: dict[type[Row], str] = {
+    Sighting: "sighting",
+    Scan: "scan",
+    CameraOrder: "camera_order",
+    Diagnostic: "diagnostic",
+}
+TIMES = frozenset({"time", "stamp", "first_seen", "started", "ended", "at"})  # the columns that hold a time
+FINAL_STATES = ("done", "failed", "refused", "cancelled")  # of an order; it has one of them once
+
+
+@dataclass(slots=True)
+class Batch:
+    """What is written in one transaction. Writing the same batch again changes nothing.
+
+    The session's bookkeeping (`mqtt_session.seen`) belongs to the same transaction and will be one more field.
+    """
+
+    samples: list[Sample] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        return len(self.samples) + len(self.rows)
+
+    def extend(self, other: Batch) -> None:
+        """Adds all of another batch behind this one."""
+        self.samples += other.samples
+        self.rows += other.rows
+
+    def halves(self) -> tuple[Batch, Batch]:
+        """The same in two, to find the one row that a database refuses."""
+        s, r = (len(self.samples) + 1) // 2, len(self.rows) // 2
+        return Batch(self.samples[:s], self.rows[:r]), Batch(self.samples[s:], self.rows[r:])
+
+
+class Storage(Protocol):
+    """One open database. Used from one thread.
+
+    Every call may raise Unavailable; the storage is then to be closed and another opened. Opening it brings the
+    tables up to date; ConfigError says why it cannot be used at all (accounts, character set, a newer schema).
+    """
+
+    @property
+    def items(self) -> Mapping[str, Item]:
+        """The items that are known, by name."""
+        ...
+
+    def add_items(self, items: Iterable[Item]) -> None:
+        """Makes items and their views; of one that is there the kind follows, and a missing unit is filled in."""
+
+    def write(self, batch: Batch) -> None:
+        """Writes all of it in one transaction, or nothing. Its items are known.
+
+        BadMessage when the database refuses a value; which one, the halves of the batch tell.
+        """
+
+    def last(self, item: str) -> Sample | None:
+        """The newest sample of an item."""
+        ...
+
+    def last_values(self) -> dict[str, Sample]:
+        """The newest sample of every item that has one."""
+        ...
+
+    def last_diagnostics(self) -> dict[str, Diagnostic]:
+        """The newest row of every component."""
+        ...
+
+    def samples(
+        self, item: str, *, since: int | None = None, until: int | None = None, limit: int | None = None
+    ) -> list[Sample]:
+        """The samples of `since <= time < until`, oldest first; with `limit` the newest so many of them."""
+        ...
+
+    def sightings(self, marker: int, limit: int) -> list[Sighting]:
+        """Where a marker was seen, newest first."""
+        ...
+
+    def close(self) -> None:
+        """Ends the connection."""
+
+
+def open_storage(address: Address | str, folder: Path = Path()) -> Storage:
+    """Opens the database of an address (`address.py` tells its forms); a relative file starts from `folder`.
+
+    ConfigError when it cannot be used, Unavailable when it is away; waits CONNECT_TIMEOUT_S (5 s) at most for it.
+    """
+    if isinstance(address, str):
+        address = read_address(address, folder=folder)
+    storage: Storage = import_module(BACKENDS[address.dialect]).open_address(address)
+    return storage

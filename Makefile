@@ -1,0 +1,51 @@
+# The commands of the project; the README says what they show. Needs git, make and Python 3.11 with venv.
+
+SHELL := /bin/bash
+# Debian's rospy is for Debian's Python, so that one is taken where it is new enough.
+PYTHON := $(shell for p in /usr/bin/python3 python3; do $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$p; break; }; done)
+VENV := .venv
+APARTMENT := $(VENV)/bin/apartment
+PART ?= all
+N ?= 0
+SEED ?= 1
+
+.PHONY: demo test soak bench lint check clean system-packages
+
+demo: $(VENV)/demo.stamp
+	@$(APARTMENT) demo $(ARGS)
+
+test: $(VENV)/dev.stamp system-packages
+	$(VENV)/bin/python -m pytest $(ARGS)
+
+soak: $(VENV)/dev.stamp
+	@$(VENV)/bin/python -m tests.soak --part $(PART) --turns $(N) --seed $(SEED)
+
+bench: $(VENV)/dev.stamp
+	@$(VENV)/bin/python -m tests.bench $(ARGS)
+
+lint: $(VENV)/dev.stamp
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/mypy
+
+# With root or sudo the Debian packages that the tests meet are installed; without, those tests say what they miss.
+system-packages:
+	@./.ci/system-packages
+
+$(VENV)/bin/python:
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is missing: apt-get install python3 python3-venv"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "Python's venv is missing: apt-get install python3-venv"; exit 1; }
+	@$(PYTHON) -m venv --system-site-packages $(VENV)
+
+$(VENV)/demo.stamp: pyproject.toml | $(VENV)/bin/python
+	@echo "Installing into $(VENV) ..."
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -e '.[embedded]'
+	@touch $@
+
+$(VENV)/dev.stamp: pyproject.toml | $(VENV)/bin/python
+	@echo "Installing into $(VENV) ..."
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@ $(VENV)/demo.stamp
+
+clean:
+	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,191 @@
+"""The command line: `apartment ...`, or `python -m services ...`. One short function each.
+
+Exit codes: 0 done, 1 the thing asked for did not happen, 2 wrong usage or configuration, 130 Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from services import access, client, process, topics
+from services.bus import Message
+from services.config import Apartment, load
+from services.errors import ApartmentError, ConfigError
+from services.payloads import OrderResult
+from services.supervisor import Supervisor, command
+
+app = typer.Typer(
+    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+    help="A smart apartment, its ceiling camera and a ROS 1 robot on one MQTT event bus.",
+)  # fmt: skip
+Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
+Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
+CONFIG = Path("config/apartment.yaml")
+out = Console(soft_wrap=True, highlight=False)
+err = Console(stderr=True, soft_wrap=True, highlight=False)
+
+
+@app.command(epilog="Example: apartment run --config config/simulated.yaml")
+def run(services: Annotated[list[str] | None, typer.Argument()] = None, config: Config = CONFIG) -> None:
+    """Start services (all that the configuration has), one process each, and keep them running."""
+    process.log_to_stderr()
+    apartment = load(config, tuple(services) if services else None)
+    names = _names(apartment, services)
+    supervisor = Supervisor({name: command(name, config.resolve()) for name in names})
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: supervisor.stop())
+    supervisor.run(lambda ready: _say(process.ready_line("run", {"services": ready})))
+
+
+@app.command(epilog="Example: apartment serve bridge")
+def serve(name: str, config: Config = CONFIG) -> None:
+    """Run one service in this process: what `run` and systemd start."""
+    process.log_to_stderr()
+    apartment = load(config, (name,))
+    _names(apartment, [name])
+    process.serve(apartment, name, lambda addresses: _say(process.ready_line(name, addresses)))
+
+
+@app.command(epilog="Example: apartment simulate camera --config config/simulated.yaml")
+def simulate(what: Annotated[str, typer.Argument(help="camera or home")], config: Config = CONFIG) -> None:
+    """Run one simulator alone."""
+    serve(f"simulated-{what}", config)
+
+
+@app.command(epilog="Example: apartment check --config config/apartment.yaml")
+def check(config: Config = CONFIG) -> None:
+    """Check a configuration: lists every fault with file and line."""
+    apartment = load(config)
+    cameras = ", ".join(apartment.cameras) or "none"
+    out.print(f"{config}: good. Services: {', '.join(apartment.instances)}. Cameras: {cameras}.")
+
+
+@app.command(name="topics", epilog="Example: apartment topics --write bus_topics.md")
+def topics_(
+    write: Annotated[Path | None, typer.Option(help="Write the table there.")] = None,
+    acl: Annotated[
+        Path | None, typer.Option(help="Write the broker's access list there, for the cameras of --config.")
+    ] = None,
+    config: Config = CONFIG,
+) -> None:
+    """Show the table of topics, or write the files that come from it."""
+    if write is not None:
+        write.write_text(topics.markdown(), encoding="utf-8")
+    if acl is not None:
+        acl.write_text(access.acl(load(config).cameras), encoding="utf-8")
+    if write is None and acl is None:
+        _say(topics.markdown())
+
+
+@app.command(epilog="Example: apartment status --json")
+def status(config: Config = CONFIG, json: Json = False) -> None:
+    """Show which services are online, since when and what they counted."""
+    apartment = load(config)
+    filters = (topics.SERVICE_STATUS.filter, topics.SERVICE_INFO.filter)
+    with client.connected(apartment.bus, filters) as bus:
+        bus.pump(0.5)
+        bus.pump(0.5)
+        rows = _status_rows(apartment, bus.seen)
+    if json:
+        out.print_json(data=rows)
+    else:
+        _show_status(rows)
+    if any(row["status"] != "online" for row in rows.values()):
+        raise typer.Exit(1)
+
+
+@app.command(epilog="Example: apartment order ip1 Goto Kitchen")
+def order(camera: str, key: str, value: str = "", config: Config = CONFIG, json: Json = False) -> None:
+    """Give a camera an order and wait until it is done."""
+    with client.connected(load(config).bus, (topics.CAMERA_ORDER_RESULT.filter,)) as bus:
+        _ended(bus.order(camera, key, value, tell=None if json else _tell_order), json)
+
+
+@app.command(epilog="Example: apartment scan ip1 --target 582")
+def scan(
+    camera: str,
+    target: Annotated[list[int], typer.Option(help="A marker; repeat for more.")],
+    config: Config = CONFIG,
+    json: Json = False,
+) -> None:
+    """Look for markers with a camera; exit 1 when one was not found."""
+    filters = (topics.CAMERA_ORDER_RESULT.filter, topics.CAMERA_SCAN_RESULT.filter)
+    with client.connected(load(config).bus, filters) as bus:
+        result = bus.order(camera, "Scan", {"targets": target}, timeout_s=600.0, tell=None if json else _tell_order)
+        found = {message.topic: message for message in bus.seen if message.topic.endswith("/scan/result")}
+    for message in found.values():
+        out.print_json(message.payload.decode()) if json else out.print(topics.read(message, message.received).payload)
+    if result.state != "done" or not found:
+        raise typer.Exit(1)
+
+
+def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:
+    known = list(apartment.instances)
+    unknown = [name for name in wanted or [] if name not in known]
+    if unknown:
+        raise ConfigError([f"{apartment.file}:1: services: expected of {', '.join(known)}, got {', '.join(unknown)}"])
+    return list(wanted or known)
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _status_rows(apartment: Apartment, seen: list[Message]) -> dict[str, dict[str, Any]]:
+    rows: dict[str, dict[str, Any]] = {
+        name: {"status": "never seen", "info": None} for name, one in apartment.instances.items() if one.row.on_bus
+    }
+    for message in seen:
+        known = topics.read(message, message.received)
+        row = rows.setdefault(known.levels["service"], {"status": "never seen", "info": None})
+        if known.topic is topics.SERVICE_STATUS:
+            row["status"] = known.payload
+        else:
+            row["info"] = known.payload.model_dump()
+    return rows
+
+
+def _show_status(rows: dict[str, dict[str, Any]]) -> None:
+    table = Table("service", "status", "since", "received", "published", "bad")
+    for name, row in sorted(rows.items()):
+        info = row["info"] or {"started": "", "counters": {}}
+        counted = [f"{info['counters'].get(key, 0):.0f}" for key in ("received", "published", "bad")]
+        table.add_row(name, row["status"], info["started"], *counted)
+    out.print(table)
+
+
+def _tell_order(result: OrderResult) -> None:
+    out.print(f"{result.key}: {result.state}{f' ({result.error})' if result.error else ''}")
+
+
+def _ended(result: OrderResult, json: bool) -> None:
+    if json:
+        out.print_json(result.model_dump_json())
+    if result.state != "done":
+        raise typer.Exit(1)
+
+
+def main() -> None:
+    """Runs the command line; every error of ours becomes a line and an exit code, never a traceback."""
+    try:
+        app(standalone_mode=True)
+    except ConfigError as error:
+        for fault in error.faults:
+            err.print(fault, style="red", markup=False)
+        sys.exit(2)
+    except (ApartmentError, TimeoutError) as error:
+        err.print(str(error), style="red", markup=False)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

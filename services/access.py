@@ -1,0 +1,89 @@
+"""Who may do what at the broker: mosquitto's ACL from the topic table, one account per service.
+
+Not here: the passwords themselves (`apartment secrets`, environment or credential files).
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from services.registry import REGISTRY
+from services.topics import TABLE, Topic
+
+PLAYS = {row.name: row.plays for row in REGISTRY if row.plays}
+ITERATIONS = 101  # of PBKDF2, as mosquitto_passwd of Debian 12 writes
+
+
+def accounts(cameras: Iterable[str]) -> list[str]:
+    """Every account that a broker of ours knows: services, roles of the table, one per camera."""
+    own = {row.name for row in REGISTRY if row.on_bus and "<cam>" not in row.name}
+    roles = {role for row in TABLE for role in (*row.writers, *row.readers) if "<" not in role}
+    return [*sorted(own | roles), *(f"camera-{camera}" for camera in cameras)]
+
+
+def acl(cameras: Iterable[str], *, anonymous: bool = False) -> str:
+    """mosquitto's acl_file: what each account may write and read.
+
+    `anonymous`: a client without a name may do everything. For the demo and for tests on loopback, where a newcomer
+    plays the home, the robot and the operator in turn; an installation has no such clients.
+    """
+    cameras = list(cameras)
+    lines = ["# Written by `apartment topics --acl` from services/topics.py; a test keeps them equal.", ""]
+    if anonymous:
+        lines += ["# whoever gives no name", "topic readwrite #", ""]
+    for account in accounts(cameras):
+        lines += [f"user {account}", *_rights(account, cameras), ""]
+    return "\n".join(lines)
+
+
+def _rights(account: str, cameras: list[str]) -> list[str]:
+    rows: dict[str, str] = {}
+    for topic in TABLE:
+        writes, reads = _may(account, topic.writers), _may(account, topic.readers)
+        if writes or reads or "<service>" in topic.writers:
+            _add(rows, account, topic, writes=writes, reads=reads)
+    reply = f"topic {'readwrite' if account == 'operator' else 'write'} reply/#"
+    return [*(f"topic {right} {topic_filter}" for topic_filter, right in rows.items()), reply]
+
+
+def _add(rows: dict[str, str], account: str, topic: Topic, *, writes: bool, reads: bool) -> None:
+    """A service's own topics carry its name in the level `<service>` or `<cam>`."""
+    camera = account.removeprefix("camera-") if account.startswith("camera-") else None
+    if "<service>" in topic.writers:
+        rows[topic.filter_for(service=account)] = "readwrite"
+        if reads:
+            rows.setdefault(topic.filter, "read")
+        return
+    own = {"cam": camera} if camera and "cam" in topic.names else {}
+    rows[topic.filter_for(**own)] = "readwrite" if writes and reads else "write" if writes else "read"
+
+
+def _may(account: str, roles: tuple[str, ...]) -> bool:
+    return (
+        account in roles or PLAYS.get(account) in roles or (account.startswith("camera-") and "camera-<cam>" in roles)
+    )
+
+
+def password_line(account: str, password: str) -> str:
+    """One line of mosquitto's password file, `user:$7$iterations$salt$hash` (PBKDF2 with SHA-512).
+
+    Source: mosquitto 2.0, `apps/mosquitto_passwd`; the test compares with the tool's own answer.
+    """
+    salt = os.urandom(12)
+    digest = hashlib.pbkdf2_hmac("sha512", password.encode(), salt, ITERATIONS)
+    return f"{account}:$7${ITERATIONS}${base64.b64encode(salt).decode()}${base64.b64encode(digest).decode()}"
+
+
+def write_passwords(file: Path, passwords: Mapping[str, str]) -> None:
+    """Writes mosquitto's password file, for nobody else to read."""
+    write_private(file, "".join(f"{password_line(account, password)}\n" for account, password in passwords.items()))
+
+
+def write_private(file: Path, text: str) -> None:
+    """Writes a file with mode 0600 from its first byte on."""
+    with open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w", encoding="utf-8") as output:
+        output.write(text)

@@ -1,0 +1,62 @@
+"""The node without ROS, in memory: for tests, for virtual time, and for a home that has no robot."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from services.bridge.node import FROM_ROS, LINK, Inlet, Kept, Link, Outlet
+from services.bridge.rules import Fields
+from services.bus import Message
+from services.errors import BadMessage
+from services.runner import Post
+
+Hear = Callable[[Fields], None]
+REMEMBERED = 1000  # published messages that a test can look at
+
+
+class SimulatedNode:
+    """Keeps `published`, and hands each message to those who `subscribe`, as rospy's node would."""
+
+    def __init__(self, outlets: tuple[Outlet, ...], inlets: tuple[Inlet, ...], post: Post) -> None:
+        self._outlets = {outlet.topic: outlet for outlet in outlets}
+        self._inlets = {inlet.topic for inlet in inlets}
+        self._post = post
+        self._kept = Kept()
+        self._subscribers: dict[str, list[Hear]] = {}
+        self.published: deque[tuple[str, Fields]] = deque(maxlen=REMEMBERED)
+        post(Message(LINK, value=Link(up=True, text="simulated, no ROS", registrations=1)))
+
+    def publish(self, topic: str, fields: Fields, key: str = "") -> None:
+        """See `Node`."""
+        outlet = self._outlets[topic]
+        if outlet.replay or outlet.latch:
+            self._kept.put(topic, key if outlet.replay else "", fields)
+        self._say(topic, fields)
+
+    def refresh(self) -> None:
+        """See `Node`."""
+        for topic, outlet in self._outlets.items():
+            for fields in self._kept.of(topic) if outlet.replay else ():
+                self._say(topic, fields)
+
+    def close(self) -> None:
+        """See `Node`."""
+        self._subscribers.clear()
+
+    def subscribe(self, topic: str, hear: Hear) -> None:
+        """What `rostopic echo` does: first what is kept, then everything."""
+        for fields in self._kept.of(topic):
+            hear(fields)
+        self._subscribers.setdefault(topic, []).append(hear)
+
+    def send(self, topic: str, fields: Fields) -> None:
+        """What `rostopic pub` does; BadMessage when nobody here listens to that topic."""
+        if topic not in self._inlets:
+            raise BadMessage(f"expected one of {', '.join(sorted(self._inlets))}, got {topic!r}")
+        self._post(Message(FROM_ROS + topic, value=fields))
+
+    def _say(self, topic: str, fields: Fields) -> None:
+        self.published.append((topic, fields))
+        for hear in self._subscribers.get(topic, ()):
+            hear(fields)

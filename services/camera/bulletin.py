@@ -1,0 +1,112 @@
+"""What a camera says unasked: status, position, places, stream and health, each when it has changed."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+from pydantic import BaseModel
+
+from services import topics
+from services.bus import Message
+from services.camera.device import same
+from services.camera.health import Health
+from services.camera.places import Places
+from services.camera.requests import Identity, Reading, Refused
+from services.errors import ConfigError
+from services.payloads import Diagnostic, Position, Stream
+
+EVERY_S = 1.0  # the diagnostics
+MOVING_S = 0.5  # the position while it changes
+LEVELS = {"online": 0, "degraded": 1, "rebooting": 1}  # of diagnostic_msgs/DiagnosticStatus; all others 2
+
+log = logging.getLogger(__name__)
+
+
+class Bulletin:
+    """Remembers what was said last, so that nothing is said twice."""
+
+    def __init__(self, camera: str, health: Health, places: Places, publish: Callable[[Message], None]) -> None:
+        self.camera = camera
+        self.health = health
+        self.places = places
+        self.publish = publish
+        self.due = 0.0
+        self.reading: Reading | None = None
+        self.turning = False
+        self.identity: Identity | None = None
+        self._read_at = 0.0
+        self._said: dict[topics.Topic, BaseModel] = {}
+        self._position_at = 0.0
+
+    def take(self, reading: Reading, at: float) -> None:
+        """A new reading from the camera."""
+        changed = self.reading is not None and not same(self.reading, reading)
+        self.turning = changed or reading.moving is True
+        self.reading, self._read_at = reading, at
+
+    def known(self) -> Reading:
+        """The newest reading; Refused when there is none."""
+        if self.reading is None:
+            raise Refused("the camera has not told its position yet")
+        return self.reading
+
+    def at_rest(self, now: float, age_s: float) -> Reading | None:
+        """The newest reading when it is of a camera at rest and not older than that."""
+        return self.reading if not self.turning and now - self._read_at <= age_s else None
+
+    def position(self) -> Position | None:
+        """The newest reading as it is published."""
+        if self.reading is None:
+            return None
+        pan, tilt, zoom = self.reading.pan, self.reading.tilt, self.reading.zoom
+        place = None if self.turning else self.places.at(self.reading)
+        return Position(pan=pan, tilt=tilt, zoom=zoom, moving=self.turning, place=place)
+
+    def say(self, topic: topics.Topic, payload: BaseModel) -> None:
+        """Publishes a state unless it is what was said last."""
+        if self._said.get(topic) != payload:
+            self._said[topic] = payload
+            self.publish(topic.message(payload, cam=self.camera))
+
+    def tick(self, now: float, counters: dict[str, int]) -> None:
+        """Publishes what has changed, and the health once a second."""
+        self.say(topics.CAMERA_STATUS, self.health.status)
+        self._say_position(now)
+        if now >= self.due:
+            self.due = now + EVERY_S
+            self._reload()
+            self.say(topics.CAMERA_PLACES, self.places.payload)
+            self.say(topics.CAMERA_STREAM, Stream(rtsp=False, mjpeg=False, url=""))
+            component = f"camera/{self.camera}"
+            self.publish(topics.DIAGNOSTICS.message(self._diagnostic(counters), component=component))
+
+    def _reload(self) -> None:
+        """Somebody may have edited the files; a fault is told once, and the old places stay."""
+        try:
+            self.places.reload()
+        except ConfigError as error:
+            log.warning("%s: the places stay as they were: %s", self.camera, error)
+
+    def _say_position(self, now: float) -> None:
+        position = self.position()
+        if position is None or (position.moving and now - self._position_at < MOVING_S):
+            return
+        if self._said.get(topics.CAMERA_POSITION) != position:
+            self._position_at = now
+            self.say(topics.CAMERA_POSITION, position)
+
+    def _diagnostic(self, counters: dict[str, int]) -> Diagnostic:
+        identity = self.identity or Identity("", "", "")
+        values = {
+            "http_latency_ms": f"{1000 * self.health.latency:.0f}",
+            "model": identity.model,
+            "firmware": identity.version,
+            **{name: str(count) for name, count in counters.items()},
+        }
+        return Diagnostic(
+            level=LEVELS.get(self.health.state, 2),
+            message=": ".join(part for part in (self.health.state, self.health.reason) if part),
+            values=values,
+            hardware_id=identity.serial or self.camera,
+        )

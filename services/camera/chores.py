@@ -1,0 +1,124 @@
+"""The orders that do not turn the camera, as plans: places, targets, picture options, reboot, snapshots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+from services import topics
+from services.camera import orders, video
+from services.camera.bulletin import Bulletin
+from services.camera.health import Health
+from services.camera.orders import Command
+from services.camera.places import Places
+from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.requests import (
+    Away,
+    ClearPreset,
+    Picture,
+    Reboot,
+    Refused,
+    SavePreset,
+    SetPicture,
+    Snapshot,
+    Status,
+)
+from services.camera.scanner import Scanner
+from services.camera.stand import settle
+from services.payloads import Place
+
+WITHOUT_CAMERA = orders.ShowScan | orders.Targets | orders.Routine  # these are taken while it is away too
+DOWN_S = 20.0  # a camera that still answers so long after the order does not reboot (or was too quick to be seen)
+UP_S = 180.0  # 40 to 105 s were seen
+
+
+class Chores:
+    """Makes the plan for each of these orders."""
+
+    def __init__(self, places: Places, scanner: Scanner, health: Health, bulletin: Bulletin) -> None:
+        self.places = places
+        self.scanner = scanner
+        self.health = health
+        self.bulletin = bulletin
+        self._plans: dict[type, Callable[[Any, float], Plan[None]]] = {
+            orders.SavePlace: self._save,
+            orders.RemovePlace: self._remove,
+            orders.ShowScan: self._show,
+            orders.Targets: self._targets,
+            orders.Routine: self._routine,
+            orders.Options: self._options,
+            orders.Restart: self._restart,
+        }
+
+    def plan(self, command: Command, now: float) -> Plan[None]:
+        """The plan; it raises Refused or another DeviceError when the order cannot be carried out."""
+        return self._plans[type(command)](command, now)
+
+    def snapshot(self) -> Plan[None]:
+        """Takes a picture and publishes it upright."""
+        reply = yield from ask(Snapshot())
+        jpeg, picture = cast(bytes, reply.result), self.scanner.picture
+        image = video.decode(jpeg)
+        turned = video.upright(image, flip=picture.flip, mirror=picture.mirror, kind=self.scanner.kind)
+        data = jpeg if turned is image else video.encode(turned)
+        self.bulletin.publish(topics.CAMERA_SNAPSHOT.message(data, cam=self.bulletin.camera))
+
+    def _save(self, order: orders.SavePlace, now: float) -> Plan[None]:
+        if self.bulletin.turning:
+            raise Refused("the camera is moving")
+        reading, _ = yield from settle(None)
+        old = self.places.named.get(order.place)
+        preset = old.preset if old is not None and old.preset is not None else self.places.free_preset()
+        saved = yield from attempt(SavePreset(preset))
+        if isinstance(saved.error, Away):
+            raise saved.error
+        number = preset if saved.error is None else None  # without presets the place still works
+        self.places.save(order.place, Place(pan=reading.pan, tilt=reading.tilt, zoom=reading.zoom, preset=number))
+
+    def _remove(self, order: orders.RemovePlace, now: float) -> Plan[None]:
+        place = self.places.get(order.place)
+        self.places.remove(order.place)
+        if place.preset is not None:
+            yield from attempt(ClearPreset(place.preset))
+
+    def _show(self, order: orders.ShowScan, now: float) -> Plan[None]:
+        self.scanner.show = order.on
+        yield from ()
+
+    def _targets(self, order: orders.Targets, now: float) -> Plan[None]:
+        self.scanner.targets = orders.changed(self.scanner.targets, order)
+        yield from ()
+
+    def _routine(self, order: orders.Routine, now: float) -> Plan[None]:
+        if order.places is not None:
+            for name in order.places:
+                self.places.get(name)
+        self.scanner.routine = order.places
+        yield from ()
+
+    def _options(self, order: orders.Options, now: float) -> Plan[None]:
+        wanted = order.request
+        reply = yield from ask(wanted)
+        if not _has(cast(Picture, reply.result), wanted):
+            raise Refused("the camera said OK, but its settings have not changed")
+
+    def _restart(self, order: orders.Restart, now: float) -> Plan[None]:
+        reply = yield from ask(Reboot())
+        self.health.reboot()
+        began, was_down = reply.received, False
+        try:
+            while True:
+                now = yield from wait(reply.received + 1.0)
+                reply = yield from attempt(Status())
+                was_down = was_down or isinstance(reply.error, Away)
+                if reply.error is None and (was_down or now - began > DOWN_S):
+                    return
+                if now - began > UP_S:
+                    raise Away(f"it has not come back within {UP_S:.0f} s")
+        finally:
+            self.health.rebooted()
+
+
+def _has(picture: Picture, wanted: SetPicture) -> bool:
+    pairs = ((wanted.flip, picture.flip), (wanted.mirror, picture.mirror), (wanted.mode, picture.mode))
+    return all(want is None or want == has for want, has in pairs)

@@ -1,0 +1,174 @@
+"""The threads that talk to the camera: one for control, one for pictures, one request in flight in each.
+
+A Stop overtakes everything that waits, and what waits to start a motion is dropped by it. Replies go to the inbox
+as `/camera/reply`. Not here: what is asked (`requests.py`), how it is said (`brands/`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Protocol
+
+from services.bus import Message
+from services.camera.requests import (
+    Camera,
+    GotoPreset,
+    Rank,
+    Reading,
+    Refused,
+    Reply,
+    Request,
+    Start,
+    Status,
+    Stop,
+)
+from services.errors import DeviceError
+from services.runner import Post
+
+REPLY = "/camera/reply"
+STILL_DEG = 0.15  # two readings nearer than this are the same: the resolution is 0.1 degree
+END_S = 8.0  # how long the end of the service waits until the camera stands still
+
+log = logging.getLogger(__name__)
+
+
+class Sender(Protocol):
+    """What the service needs of a device; in virtual time another one does the same without threads."""
+
+    def submit(self, request: Request, ticket: int) -> None:
+        """Sends when its turn has come; the answer is a `/camera/reply` message with this ticket."""
+        ...
+
+    def close(self) -> None:
+        """Drops what waits, makes sure that nothing moves, and ends."""
+        ...
+
+
+@dataclass(order=True)
+class _Waiting:
+    rank: Rank
+    number: int
+    request: Request
+    ticket: int
+
+
+class Lane:
+    """One thread, one connection, one request in flight."""
+
+    def __init__(self, name: str, camera: Camera, post: Post, clock: Callable[[], float]) -> None:
+        self.camera = camera
+        self.post = post
+        self.clock = clock
+        self.started = False  # a motion may be running
+        self._waiting: list[_Waiting] = []
+        self._numbers = itertools.count()
+        self._changed = threading.Condition()
+        self._closing = False
+        self.thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self.thread.start()
+
+    def put(self, request: Request, ticket: int) -> None:
+        """Lets a request wait for its turn."""
+        with self._changed:
+            dropped = self._overtaken() if isinstance(request, Stop) else []
+            heappush(self._waiting, _Waiting(request.rank, next(self._numbers), request, ticket))
+            self._changed.notify()
+        for waiting in dropped:
+            self._answer(waiting, None, Refused("overtaken by a stop"), self.clock())
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def end(self) -> None:
+        """Drops what waits; the thread ends after the request in flight."""
+        with self._changed:
+            self._waiting.clear()
+            self._closing = True
+            self._changed.notify()
+
+    def _overtaken(self) -> list[_Waiting]:
+        dropped = [waiting for waiting in self._waiting if waiting.rank is Rank.MOVE]
+        self._waiting = sorted(waiting for waiting in self._waiting if waiting.rank is not Rank.MOVE)
+        return dropped
+
+    def _run(self) -> None:
+        while (waiting := self._next()) is not None:
+            sent = self.clock()
+            try:
+                result = self._send(waiting.request)
+            except DeviceError as error:
+                self._answer(waiting, None, error, sent)
+            else:
+                self._answer(waiting, result, None, sent)
+        if self.started:
+            stand_still(self.camera, self.clock)
+        self.camera.close()
+
+    def _next(self) -> _Waiting | None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._closing or self._waiting)
+            return heappop(self._waiting) if self._waiting else None
+
+    def _send(self, request: Request) -> object:
+        if isinstance(request, Start | GotoPreset):
+            self.started = True  # before it is sent: a start whose answer is lost may have been heard
+        result = self.camera.send(request)
+        if isinstance(request, Stop):
+            self.started = False
+        return result
+
+    def _answer(self, waiting: _Waiting, result: object, error: DeviceError | None, sent: float) -> None:
+        reply = Reply(waiting.request, waiting.ticket, result, error, sent, self.clock())
+        self.post(Message(REPLY, value=reply, received=reply.received))
+
+
+class Device:
+    """A Sender for a camera on the network."""
+
+    def __init__(self, connect: Callable[[], Camera], post: Post, clock: Callable[[], float] = time.time) -> None:
+        self.control = Lane("camera control", connect(), post, clock)
+        self.pictures = Lane("camera pictures", connect(), post, clock)
+
+    def submit(self, request: Request, ticket: int) -> None:
+        """Any thread; returns at once."""
+        lane = self.pictures if request.rank is Rank.PICTURE else self.control
+        lane.put(request, ticket)
+
+    def close(self) -> None:
+        """Returns when the camera stands still and both threads have ended, or after `END_S`."""
+        for lane in (self.control, self.pictures):
+            lane.end()
+        self.control.thread.join(END_S)
+        self.pictures.thread.join(0.5)
+
+
+def stand_still(camera: Camera, clock: Callable[[], float], limit_s: float = END_S) -> bool:
+    """Sends a stop until it is confirmed and two readings are equal; whether that was so within the limit."""
+    end = clock() + limit_s
+    every = False
+    while clock() < end:
+        try:
+            camera.send(Stop(every=every))
+            readings = [camera.send(Status()) for _ in range(3)]  # the first may lag behind the motor
+        except DeviceError as error:
+            log.warning("the stop at the end is not confirmed yet: %s", error)
+            time.sleep(0.2)
+            continue
+        before, after = readings[1:]
+        if isinstance(before, Reading) and isinstance(after, Reading) and same(before, after):
+            return True
+        every = True
+    log.error("the camera may still be moving: no confirmed stop within %.0f s", limit_s)
+    return False
+
+
+def same(one: Reading, other: Reading) -> bool:
+    """Whether two readings show a camera at rest (it repeats a value, or dithers by 0.1 degree)."""
+    pan = abs((one.pan - other.pan + 180) % 360 - 180)
+    return pan < STILL_DEG and abs(one.tilt - other.tilt) < STILL_DEG and abs(one.zoom - other.zoom) < STILL_DEG

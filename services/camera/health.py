@@ -1,0 +1,82 @@
+"""Whether the camera can be used, judged by its replies, and how long to leave it in peace. Pure.
+
+A lost camera is told once, and its return once.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import Literal
+
+from services.camera.requests import Away, BadLogin, Locked, Reply
+from services.payloads import CameraStatus
+
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0  # between attempts to reach a camera that is away
+LOGIN_PAUSE_S, LONGEST_LOGIN_S = 120.0, 1800.0  # after a wrong password: each attempt may lock the account
+IDLE_S = 1.0  # between two readings of a camera at rest
+
+State = Literal["online", "offline", "bad_login", "locked", "rebooting", "degraded"]
+log = logging.getLogger(__name__)
+
+
+@dataclass
+class Health:
+    """The state of one camera; `next_poll` is when it may be asked again."""
+
+    name: str
+    state: State = "offline"
+    reason: str = "not asked yet"
+    next_poll: float = 0.0
+    latency: float = 0.0
+    failures: int = 0
+    rebooting: bool = False
+    moving: bool = False  # a motion is to be stopped: losing the camera now is worse than offline
+
+    @property
+    def online(self) -> bool:
+        """Whether orders make sense."""
+        return self.state == "online"
+
+    @property
+    def status(self) -> CameraStatus:
+        """What is published."""
+        return CameraStatus(state=self.state, reason=self.reason)
+
+    def take(self, reply: Reply) -> None:
+        """Judges one reply. A refusal is an answer too: the camera is there."""
+        error = reply.error
+        if isinstance(error, BadLogin | Locked):
+            self._away(reply, "bad_login" if isinstance(error, BadLogin) else "locked", str(error))
+            self.next_poll = reply.received + min(LONGEST_LOGIN_S, LOGIN_PAUSE_S * 2 ** (self.failures - 1))
+        elif isinstance(error, Away):
+            state: State = "rebooting" if self.rebooting else "degraded" if self.moving else "offline"
+            self._away(reply, state, str(error))
+            self.next_poll = reply.received + min(LONGEST_PAUSE_S, FIRST_PAUSE_S * 2 ** min(self.failures - 1, 10))
+        elif not self.rebooting:
+            self._there(reply)
+
+    def reboot(self) -> None:
+        """The camera was told to start again."""
+        self.rebooting = True
+        self.state, self.reason = "rebooting", "as ordered"
+
+    def rebooted(self) -> None:
+        """It is up again."""
+        self.rebooting = False
+        self.state, self.reason = "online", ""
+
+    def _away(self, reply: Reply, state: State, reason: str) -> None:
+        self.failures += 1
+        if self.state == "online":
+            log.warning("%s: lost: %s", self.name, reason)
+        elif self.failures == 1:
+            log.warning("%s: not reached: %s", self.name, reason)
+        self.state, self.reason = state, reason
+
+    def _there(self, reply: Reply) -> None:
+        if self.state != "online":
+            log.info("%s: online", self.name)
+        self.state, self.reason, self.failures = "online", "", 0
+        self.latency += 0.2 * (reply.received - reply.sent - self.latency)
+        self.next_poll = reply.received + IDLE_S

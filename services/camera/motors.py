@@ -1,0 +1,156 @@
+"""Who has the motors: one order at a time, and a stop between two of them.
+
+A human's newest order wins, then a mission's, then a scan's; the loser ends `cancelled`. An order that fails or is
+cancelled is followed by a stop that is sent until it is confirmed; nothing else moves the camera before that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from services.camera import orders
+from services.camera.answers import Answers, Job
+from services.camera.move import Arrival
+from services.camera.orders import Command, MoveBy, ScanFor
+from services.camera.plan import Plan, Run, Stage
+from services.camera.requests import Refused
+from services.camera.stand import Hold, halt, stop
+from services.payloads import OrderState
+
+STOP_LIMIT_S = 10.0  # a Stop order that is not confirmed by then has failed; the stopping goes on
+
+MakePlan = Callable[[Command, float], Plan[Any]]
+Ended = Callable[[Job, OrderState, str | None, float], None]
+
+
+class Motors:
+    """The one that may start motions. `ended` hears of every order that had the motors."""
+
+    def __init__(self, stage: Stage, answers: Answers, make_plan: MakePlan, ended: Ended) -> None:
+        self.stage = stage
+        self.answers = answers
+        self.make_plan = make_plan
+        self.ended = ended
+        self.jobs: list[Job] = []  # the order that runs, and those that prolong it
+        self.hold: Hold | None = None
+        self._run: Run | None = None
+        self._halting: Run | None = None
+        self._next: Job | None = None
+        self._stops: list[tuple[Job, float]] = []
+
+    @property
+    def busy(self) -> bool:
+        """Whether a motion or a stop is under way."""
+        return self._run is not None or self._halting is not None
+
+    @property
+    def scanning(self) -> bool:
+        """Whether a scan runs."""
+        return bool(self.jobs) and isinstance(self.jobs[0].command, ScanFor)
+
+    def order(self, job: Job, now: float) -> None:
+        """Takes an accepted order: it begins, or waits for a stop, or loses."""
+        assert job.command is not None
+        if self.jobs and self._prolong(job, job.command, now):
+            return
+        rival = self._next or (self.jobs[0] if self.jobs else None)
+        if rival is not None and rival.command is not None:
+            holder = orders.holder(rival.by, rival.command)
+            if not orders.wins(job.by, holder):
+                self.answers.tell(job, "cancelled", f"the {holder}'s order {rival.key} goes first")
+                return
+        self._cancel(f"the {job.by}'s order {job.key} goes first", now)
+        if self._halting is None:
+            self._begin(job, now)
+        else:
+            self._next = job
+
+    def halt(self, job: Job, now: float) -> None:
+        """Ends whatever runs; the order is done when the camera stands."""
+        self._cancel(f"stopped by the order {job.key}", now)
+        self.answers.tell(job, "running")
+        self._stops.append((job, now + STOP_LIMIT_S))
+        if self._halting is not None:
+            self.stage.drop(self._halting)
+        self._halt(halt(now), now)
+
+    def make_sure(self, now: float) -> None:
+        """Stops what somebody else may have started."""
+        if not self.busy:
+            self._halt(halt(now, every=True), now)
+
+    def tick(self, now: float) -> None:
+        """Gives up waiting for a stop that is not confirmed."""
+        for job, limit in list(self._stops):
+            if now > limit:
+                self._stops.remove((job, limit))
+                self.answers.tell(job, "failed", "the camera has not confirmed the stop; it is sent again and again")
+
+    def _prolong(self, job: Job, command: Command, now: float) -> bool:
+        running = self.jobs[0].command
+        if self.hold is None or not isinstance(command, MoveBy) or running is None:
+            return False
+        if not orders.prolongs(command, running) or job.by != self.jobs[0].by:
+            return False
+        self.hold.prolong(command.seconds, now)
+        self.jobs.append(job)
+        self.answers.tell(job, "running")
+        return True
+
+    def _begin(self, job: Job, now: float) -> None:
+        assert job.command is not None
+        self.jobs = [job]
+        try:
+            plan = self._plan(job.command, now)
+        except Refused as error:
+            self._end("refused", str(error), now)
+            return
+        self.answers.tell(job, "running")
+        run = self.stage.begin(plan, now, self._plan_ended)
+        self._run = None if run.done else run
+
+    def _plan(self, command: Command, now: float) -> Plan[Any]:
+        if isinstance(command, MoveBy):
+            self.hold = Hold(command.direction, command.speed, command.seconds)
+            return self.hold.plan()
+        return self.make_plan(command, now)
+
+    def _plan_ended(self, run: Run, now: float) -> None:
+        self._run = None
+        if run.error is not None:
+            self._end("failed", str(run.error), now)
+            self._halt(stop(now), now)
+            return
+        arrival = run.result
+        self._end("done", None, now, clamped=isinstance(arrival, Arrival) and arrival.clamped)
+
+    def _end(self, state: OrderState, error: str | None, now: float, *, clamped: bool = False) -> None:
+        jobs, self.jobs, self.hold = self.jobs, [], None
+        for job in jobs:
+            self.answers.tell(job, state, error, clamped=clamped)
+            self.ended(job, state, error, now)
+
+    def _cancel(self, why: str, now: float) -> None:
+        """Ends what runs or waits, with a stop where there may be motion."""
+        if self._next is not None:
+            waiting, self._next = self._next, None
+            self.answers.tell(waiting, "cancelled", why)
+        if self._run is not None:
+            self.stage.drop(self._run)
+            self._run = None
+            self._halt(stop(now), now)
+            self._end("cancelled", why, now)
+
+    def _halt(self, plan: Plan[Any], now: float) -> None:
+        run = self.stage.begin(plan, now, self._halted)
+        self._halting = None if run.done else run
+
+    def _halted(self, run: Run, now: float) -> None:
+        self._halting = None
+        stops, self._stops = self._stops, []
+        for job, _ in stops:
+            self.answers.tell(job, "done")
+        if self._next is not None:
+            job, self._next = self._next, None
+            self._begin(job, now)

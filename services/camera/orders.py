@@ -1,0 +1,289 @@
+"""The orders of a camera: from a key and a value to a command, and who wins. Pure.
+
+Keys are matched without regard to case. What cannot be done is Refused with the reason, which is the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from services.camera.places import name_of
+from services.camera.requests import Direction, Mode, Refused, SetPicture
+from services.payloads import Who
+
+RANKS: dict[Who, int] = {"scan": 0, "mission": 1, "human": 2}
+LONGEST_S = 30.0  # of one Move order: it can be prolonged
+DIRECTIONS = {
+    direction.name.replace("_", "").lower(): direction for direction in Direction if not direction.name.startswith("Z")
+}
+MODES: dict[str, Mode] = {"color": "color", "bw": "bw", "auto": "auto"}
+YES, NO = ("true", "on", "1"), ("false", "off", "0")
+NOT_AVAILABLE = {
+    "RTSP": "this version takes its pictures as snapshots",
+    "MJPEG": "this version takes its pictures as snapshots",
+    "AudioRec": "this version has no audio",
+    "AudioPlay": "this version has no audio",
+    "Privacy": "this version has no privacy mode",
+}
+
+
+@dataclass(frozen=True)
+class GotoPlace:
+    """Move to a place."""
+
+    place: str
+
+
+@dataclass(frozen=True)
+class LookAt:
+    """Move to readings; None: as it is."""
+
+    pan: float | None = None
+    tilt: float | None = None
+    zoom: float | None = None
+
+
+@dataclass(frozen=True)
+class MoveBy:
+    """Turn or zoom for some seconds."""
+
+    direction: Direction
+    speed: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class ScanFor:
+    """Look for these targets at these places; None: the configured ones."""
+
+    targets: tuple[int, ...] | None = None
+    places: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Halt:
+    """Stand still, whatever is going on."""
+
+
+@dataclass(frozen=True)
+class EndScan:
+    """Give up the scan that runs."""
+
+
+@dataclass(frozen=True)
+class SavePlace:
+    """Keep where the camera looks."""
+
+    place: str
+
+
+@dataclass(frozen=True)
+class RemovePlace:
+    """Forget a place."""
+
+    place: str
+
+
+@dataclass(frozen=True)
+class ShowScan:
+    """Publish the analysed frames or not."""
+
+    on: bool
+
+
+@dataclass(frozen=True)
+class Targets:
+    """Look for these from now on."""
+
+    how: str  # "set", "add" or "remove"
+    markers: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Routine:
+    """Visit these places in a scan; None: all, on the shortest way."""
+
+    places: tuple[str, ...] | None
+
+
+@dataclass(frozen=True)
+class Options:
+    """Change how the picture is delivered."""
+
+    request: SetPicture
+
+
+@dataclass(frozen=True)
+class Restart:
+    """Reboot the camera."""
+
+
+Motor = GotoPlace | LookAt | MoveBy | ScanFor
+Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Options | Restart
+
+
+def read(key: str, value: Any) -> Command:
+    """The command; Refused when it is none."""
+    known = KEYS.get(key.lower())
+    if known is None:
+        raise Refused(f"no order {key[:40]!r}; there are {', '.join(sorted(name for name, _ in KEYS.values()))}")
+    _, reader = known
+    try:
+        return reader(value)
+    except ValueError as error:
+        raise Refused(str(error)) from error
+
+
+def canonical(key: str) -> str:
+    """The key as the contract writes it, as far as it is known."""
+    known = KEYS.get(key.lower())
+    return known[0] if known else key
+
+
+def wins(new: Who, running: Who) -> bool:
+    """Whether a new order takes the motors from the one that has them."""
+    return RANKS[new] >= RANKS[running]
+
+
+def holder(by: Who, command: Command) -> Who:
+    """As whose the motors count while a command runs: a scan gives way to everybody."""
+    return "scan" if isinstance(command, ScanFor) else by
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, dict | list):
+        raise ValueError(f"expected a text, got {str(value)[:80]!r}")
+    return str(value).strip()
+
+
+def _flag(value: Any) -> bool:
+    text = _text(value).lower()
+    if text not in YES + NO:
+        raise ValueError(f"expected True or False, ON or OFF, 1 or 0, got {text[:80]!r}")
+    return text in YES
+
+
+def _names(value: Any) -> tuple[str, ...]:
+    parts = value if isinstance(value, list) else [part for part in _text(value).split(",") if part.strip()]
+    if not parts:
+        raise ValueError("expected at least one place")
+    return tuple(name_of(str(part)) for part in parts)
+
+
+def _markers(value: Any) -> tuple[int, ...]:
+    parts = value if isinstance(value, list) else _text(value).split(",")
+    markers = tuple(int(part) for part in map(str, parts) if part.strip().isascii() and part.strip().isdigit())
+    if len(markers) != len(parts) or not all(marker <= 9999 for marker in markers):
+        raise ValueError(f"expected marker ids such as 582, got {str(value)[:80]!r}")
+    return tuple(dict.fromkeys(markers))
+
+
+def _move(value: Any) -> Command:
+    words = _text(value).split()
+    direction = words[0].lower().replace("_", "").replace("-", "") if words else ""
+    if direction == "stop" and len(words) == 1:
+        return Halt()
+    if direction not in DIRECTIONS or len(words) > 3:
+        raise ValueError(f"expected Stop, or {', '.join(DIRECTIONS)} with speed and seconds, got {_text(value)[:80]!r}")
+    speed, seconds = [*words[1:], "4", "1"][0], words[2] if len(words) > 2 else "1"
+    return MoveBy(DIRECTIONS[direction], _speed(speed), _seconds(seconds))
+
+
+def _speed(text: str) -> int:
+    if text not in "12345678" or len(text) != 1:
+        raise ValueError(f"expected a speed from 1 to 8, got {text[:80]!r}")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = float("nan")
+    if not 0 < seconds <= LONGEST_S:
+        raise ValueError(f"expected seconds from 0 to {LONGEST_S:g}, got {text[:80]!r}")
+    return seconds
+
+
+def _zoom(value: Any) -> Command:
+    word = _text(value).lower()
+    if word in ("in", "out"):
+        return MoveBy(Direction.ZOOM_IN if word == "in" else Direction.ZOOM_OUT, 1, 1.0)
+    try:
+        return LookAt(zoom=float(word))
+    except ValueError as error:
+        raise ValueError(f"expected In, Out or a level from 0 to 8, got {word[:80]!r}") from error
+
+
+def _scan(value: Any) -> Command:
+    if not isinstance(value, dict):
+        return ScanFor() if _flag(value) else EndScan()
+    if unknown := set(value) - {"targets", "places"}:
+        raise ValueError(f"expected targets and places, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
+    targets, places = value.get("targets"), value.get("places")
+    return ScanFor(_markers(targets) if targets else None, _names(places) if places else None)
+
+
+def _routine(value: Any) -> Command:
+    return Routine(None if isinstance(value, str) and value.strip().lower() == "auto" else _names(value))
+
+
+def _mode(value: Any) -> Command:
+    word = _text(value).lower()
+    if word == "scan":
+        raise ValueError("not available: this version cannot set the contrast; use bw")
+    if word not in MODES:
+        raise ValueError(f"expected color, bw or auto, got {word[:80]!r}")
+    return Options(SetPicture(mode=MODES[word]))
+
+
+def _restart(value: Any) -> Command:
+    if not _flag(value):
+        raise ValueError("expected True: a reboot cannot be taken back")
+    return Restart()
+
+
+def _refuse(reason: str) -> Callable[[Any], Command]:
+    def refuse(value: Any) -> Command:
+        raise ValueError(f"not available: {reason}")
+
+    return refuse
+
+
+READERS: dict[str, Callable[[Any], Command]] = {
+    "Goto": lambda value: GotoPlace(name_of(_text(value))),
+    "SaveAs": lambda value: SavePlace(name_of(_text(value))),
+    "Remove": lambda value: RemovePlace(name_of(_text(value))),
+    "Move": _move,
+    "Zoom": _zoom,
+    "Scan": _scan,
+    "ScanImgPub": lambda value: ShowScan(_flag(value)),
+    "SetTarget": lambda value: Targets("set", _markers(value)),
+    "AddTarget": lambda value: Targets("add", _markers(value)),
+    "RemoveTarget": lambda value: Targets("remove", _markers(value)),
+    "SetRoutine": _routine,
+    "Mirror": lambda value: Options(SetPicture(mirror=_flag(value))),
+    "Flip": lambda value: Options(SetPicture(flip=_flag(value))),
+    "VideoMode": _mode,
+    "Reboot": _restart,
+    **{key: _refuse(reason) for key, reason in NOT_AVAILABLE.items()},
+}
+KEYS = {name.lower(): (name, reader) for name, reader in READERS.items()}
+
+
+def changed(targets: Iterable[int], order: Targets) -> tuple[int, ...]:
+    """The targets after such an order."""
+    if order.how == "set":
+        return order.markers
+    if order.how == "add":
+        return tuple(dict.fromkeys((*targets, *order.markers)))
+    return tuple(marker for marker in targets if marker not in order.markers)
+
+
+def prolongs(new: Command, running: Command) -> bool:
+    """Whether a Move is the one that runs already, given again."""
+    if not isinstance(new, MoveBy) or not isinstance(running, MoveBy):
+        return False
+    return (new.direction, new.speed) == (running.direction, running.speed)

@@ -1,0 +1,215 @@
+"""What can be asked of any camera, and what it answers: values without a brand, a socket or a clock.
+
+The requests become a brand's own words in `brands/`; who may send them, and in which order, is `device.py`.
+
+    DeviceError
+    ├── Refused     the camera answered, and said no
+    ├── BadLogin    the camera does not know this user and password
+    ├── Locked      too many wrong passwords: the account is closed for a while
+    └── Away        no answer, or one that makes no sense
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+from typing import Literal, Protocol
+
+from services.errors import DeviceError
+
+Mode = Literal["color", "bw", "auto"]
+
+
+class Refused(DeviceError):
+    """The camera answered, and said no."""
+
+
+class BadLogin(DeviceError):
+    """The camera does not know this user and password."""
+
+
+class Locked(DeviceError):
+    """Too many wrong passwords: the account is closed for a while."""
+
+
+class Away(DeviceError):
+    """No answer in time, or one that makes no sense."""
+
+
+class Rank(IntEnum):
+    """What goes first when several requests wait; pictures have a lane of their own."""
+
+    STOP = 0
+    MOVE = 1
+    STATUS = 2
+    CONFIG = 3
+    PICTURE = 4
+
+
+class Direction(Enum):
+    """Where a camera can be told to turn, as its picture shows it: (right, down, in) each -1, 0 or 1."""
+
+    LEFT = (-1, 0, 0)
+    RIGHT = (1, 0, 0)
+    UP = (0, -1, 0)
+    DOWN = (0, 1, 0)
+    LEFT_UP = (-1, -1, 0)
+    RIGHT_UP = (1, -1, 0)
+    LEFT_DOWN = (-1, 1, 0)
+    RIGHT_DOWN = (1, 1, 0)
+    ZOOM_IN = (0, 0, 1)
+    ZOOM_OUT = (0, 0, -1)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Turn until Stop; speeds 1 to 8, `tilt_speed` for the vertical part of a diagonal (None: the same)."""
+
+    direction: Direction
+    speed: int = 1
+    tilt_speed: int | None = None
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
+class Stop:
+    """End all motion. `every`: whatever may be running, also what somebody else started."""
+
+    every: bool = False
+    rank = Rank.STOP
+
+
+@dataclass(frozen=True)
+class Status:
+    """Where it looks; the answer is a Reading."""
+
+    rank = Rank.STATUS
+
+
+@dataclass(frozen=True)
+class GotoPreset:
+    """Let the camera's firmware drive to one of its presets."""
+
+    number: int
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
+class SavePreset:
+    """Keep the present pose as a preset of the camera."""
+
+    number: int
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class ClearPreset:
+    """Forget a preset of the camera."""
+
+    number: int
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A full-size picture; the answer is the bytes of a JPEG."""
+
+    rank = Rank.PICTURE
+
+
+@dataclass(frozen=True)
+class GetPicture:
+    """How the picture is delivered; the answer is a Picture."""
+
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class SetPicture:
+    """Changes how the picture is delivered; None leaves as it is. The answer is the Picture read back."""
+
+    flip: bool | None = None
+    mirror: bool | None = None
+    mode: Mode | None = None
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class Identify:
+    """Who are you; the answer is an Identity."""
+
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class Reboot:
+    """Start again."""
+
+    rank = Rank.CONFIG
+
+
+Request = (
+    Start
+    | Stop
+    | Status
+    | GotoPreset
+    | SavePreset
+    | ClearPreset
+    | Snapshot
+    | GetPicture
+    | SetPicture
+    | Identify
+    | Reboot
+)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Pan and tilt in degrees and zoom in levels, as the camera tells them. `moving` None: it does not say."""
+
+    pan: float
+    tilt: float
+    zoom: float
+    moving: bool | None = None
+
+
+@dataclass(frozen=True)
+class Picture:
+    """How the picture is delivered."""
+
+    flip: bool
+    mirror: bool
+    mode: Mode
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Which camera this is."""
+
+    model: str
+    serial: str
+    version: str
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What became of a request: `result`, or the `error`; `sent` and `received` in seconds since 1970."""
+
+    request: Request
+    ticket: int
+    result: object
+    error: DeviceError | None
+    sent: float
+    received: float
+
+
+class Camera(Protocol):
+    """What a brand offers: one request at a time, from one thread."""
+
+    def send(self, request: Request) -> object:
+        """Sends and waits for the answer; DeviceError when there is none or it is no."""
+        ...
+
+    def close(self) -> None:
+        """Ends the connection."""
+        ...

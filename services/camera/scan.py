@@ -1,0 +1,173 @@
+"""The marker scan as a plan: go to a place, wait for the picture, take frames, go on. They are looked at meanwhile.
+
+The scan stays at the widest zoom: the camera's zoom is digital, so it adds nothing to a full-size picture, and its true
+magnification is not known. Not here: finding markers (`analysis.py`), where they are (`sightings.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise, permutations
+from typing import Literal, cast
+
+from services.camera.analysis import Analysed
+from services.camera.goal import Limits
+from services.camera.move import goto
+from services.camera.pace import Skill
+from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.requests import Away, Reading, Snapshot
+from services.camera.sightings import Sighting
+from services.payloads import Place, ScanState
+
+ANALYSE_S = 30.0  # longest wait for the last frames to be looked at
+WELL = 2  # frames that must show a target before a scan may end early
+TRIES = 3  # of a picture: the camera sometimes closes without an answer
+PERMUTED = 7  # up to this many places the shortest order is found by trying all
+TILT_COST = 1.7  # tilt turns slower than pan: a degree of it counts as so many
+
+
+@dataclass(frozen=True)
+class Frame:
+    """When and where a picture was taken, at rest; its bytes are not kept."""
+
+    number: int
+    place: str
+    reading: Reading
+    at: float
+
+
+Look = Callable[[Frame, bytes], None]
+
+
+@dataclass
+class Scan:
+    """One scan: the plan that drives it, and what has come out so far."""
+
+    name: str
+    targets: tuple[int, ...]
+    routine: Mapping[str, Place]
+    limits: Limits
+    skill: Skill
+    began: float
+    frames: int = 4
+    settle_s: float = 0.6
+    stop_early: bool = True
+    move_timeout_s: float = 60.0
+    place: str | None = None
+    visited: int = 0
+    taken: list[Frame] = field(default_factory=list)
+    analysed: int = 0
+    seen: dict[int, list[Sighting]] = field(default_factory=dict)
+
+    def plan(self, look: Look) -> Plan[None]:
+        """Visits the places; `look` is handed every frame. Ends when all frames have been looked at."""
+        now = self.began
+        for name, place in self.routine.items():
+            self.place = name
+            now = yield from self._visit(place, now, look)
+            self.visited += 1
+            if self.stop_early:
+                now = yield from self._all_analysed(now)
+                if self.satisfied:
+                    break
+        yield from self._all_analysed(now)
+        self.place = None
+
+    def add(self, analysed: Analysed) -> None:
+        """Takes in what was found in one frame."""
+        self.analysed += 1
+        frame = self.taken[analysed.number]
+        for detection in analysed.detections:
+            if detection.marker in self.targets:
+                sighting = Sighting(detection, frame.place, frame.reading, frame.at, analysed.size)
+                self.seen.setdefault(detection.marker, []).append(sighting)
+
+    @property
+    def satisfied(self) -> bool:
+        """Whether every target was seen well."""
+        enough = min(WELL, self.frames)
+        return all(len(self.seen.get(target, ())) >= enough for target in self.targets)
+
+    def state(
+        self, state: Literal["running", "done", "cancelled", "failed"], now: float, reason: str = ""
+    ) -> ScanState:
+        """How far it is."""
+        return ScanState(
+            state=state,
+            scan=self.name,
+            targets=list(self.targets),
+            found=sorted(self.seen),
+            turn=1,
+            place=self.place,
+            progress=1.0 if state == "done" else self._progress(),
+            frames_taken=len(self.taken),
+            frames_analysed=self.analysed,
+            elapsed_s=round(max(0.0, now - self.began), 3),
+            reason=reason,
+        )
+
+    def _progress(self) -> float:
+        whole = max(1, len(self.routine) * self.frames)
+        return round(min(1.0, (len(self.taken) + self.analysed) / (2 * whole)), 3)
+
+    def _visit(self, place: Place, now: float, look: Look) -> Plan[float]:
+        goal = self.limits.goal(place.pan, place.tilt, self.limits.zoom[0])
+        arrival = yield from goto(goal, self.limits, self.skill, now + self.move_timeout_s)
+        now = yield from wait(arrival.at + self.settle_s)
+        for _ in range(self.frames):
+            jpeg, at, now = yield from _picture()
+            frame = Frame(len(self.taken), self.place or "", arrival.reading, at)
+            self.taken.append(frame)
+            look(frame, jpeg)
+        return now
+
+    def _all_analysed(self, now: float) -> Plan[float]:
+        limit = now + ANALYSE_S
+        while self.analysed < len(self.taken):
+            if now > limit:
+                raise Away("the frames were not looked at in time")
+            now = yield from wait(now + 0.05)
+        return now
+
+
+def _picture() -> Plan[tuple[bytes, float, float]]:
+    """A snapshot, when it was asked for (it is not older than that), and the time now."""
+    for _ in range(TRIES - 1):
+        reply = yield from attempt(Snapshot())
+        if reply.error is None:
+            return cast(bytes, reply.result), reply.sent, reply.received
+        yield from wait(reply.received + 0.3)
+    reply = yield from ask(Snapshot())
+    return cast(bytes, reply.result), reply.sent, reply.received
+
+
+def shortest(places: Mapping[str, Place], limits: Limits, reading: Reading | None) -> list[str]:
+    """The names in the order of the shortest open tour from where the camera looks (both axes turn at once).
+
+    All orders are tried for a few places; for more, the nearest comes next and the tour is improved by reversals.
+    """
+    poses = {name: limits.pose(Reading(place.pan, place.tilt, place.zoom)) for name, place in places.items()}
+    here = limits.pose(reading) if reading else None
+
+    def cost(order: Iterable[str]) -> float:
+        way = ([here] if here else []) + [poses[name] for name in order]
+        hops = pairwise(way)
+        return sum(max(abs(a[0] - b[0]), TILT_COST * abs(a[1] - b[1])) for a, b in hops)
+
+    if len(poses) <= PERMUTED:
+        return list(min(permutations(poses), key=cost, default=()))
+    return _improved(sorted(poses, key=lambda name: poses[name]), cost)
+
+
+def _improved(order: list[str], cost: Callable[[Iterable[str]], float]) -> list[str]:
+    """Reverses stretches of the tour while that makes it shorter (2-opt; Croes 1958)."""
+    better = True
+    while better:
+        better = False
+        for start in range(len(order)):
+            for end in range(start + 2, len(order) + 1):
+                other = order[:start] + order[start:end][::-1] + order[end:]
+                if cost(other) < cost(order) - 1e-9:
+                    order, better = other, True
+    return order

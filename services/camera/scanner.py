@@ -1,0 +1,158 @@
+"""Runs scans: hands frames to the ones who look for markers, and publishes how far it is and what came out.
+
+The scan itself is `scan.py`; looking `analysis.py`; from sightings to places in the apartment `sightings.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+from uuid import uuid4
+
+from services import topics
+from services.bus import Message
+from services.camera import sightings
+from services.camera.analysis import Analysed, Analyst, Task
+from services.camera.bulletin import Bulletin
+from services.camera.orders import ScanFor
+from services.camera.pace import Skill
+from services.camera.places import Places
+from services.camera.plan import Plan, attempt
+from services.camera.requests import GetPicture, Picture, Refused
+from services.camera.scan import Frame, Scan, shortest
+from services.camera.settings import Config
+from services.camera.sightings import Eye
+from services.payloads import OrderState, Place, ScanState
+
+STATE_S = 0.5  # between two states of a scan that runs
+
+
+class Scanner:
+    """At most one scan at a time. `analyst` makes the one that looks at frames, a new one for each scan."""
+
+    def __init__(
+        self, config: Config, skill: Skill, eye: Eye, analyst: Callable[[], Analyst], bulletin: Bulletin, places: Places
+    ) -> None:
+        self.config = config
+        self.skill = skill
+        self.eye = eye
+        self.analyst = analyst
+        self.bulletin = bulletin
+        self.places = places
+        self.targets = config.targets
+        self.routine = config.routine
+        self.show = False
+        self.picture = Picture(config.picture.flip, config.picture.mirror, "color")
+        self.frames = 0
+        self.scan: Scan | None = None
+        self._looking: Analyst | None = None
+        self._state_at = 0.0
+
+    @property
+    def kind(self) -> Literal["ceiling", "shelf"]:
+        """How the camera is mounted."""
+        return self.config.mount.kind if self.config.mount else "ceiling"
+
+    def check(self, order: ScanFor) -> None:
+        """Refused when it cannot be done."""
+        self._visits(order)
+        if not (order.targets or self.targets):
+            raise Refused("no targets: give some with SetTarget or with the order")
+
+    def plan(self, order: ScanFor, now: float) -> Plan[None]:
+        """A new scan."""
+        self.scan = Scan(
+            name=uuid4().hex[:12],
+            targets=order.targets or self.targets,
+            routine=self._visits(order),
+            limits=self.config.limits,
+            skill=self.skill,
+            began=now,
+            frames=self.config.frames,
+            settle_s=self.config.settle_s,
+            stop_early=self.config.stop_early,
+            move_timeout_s=self.config.move_timeout_s,
+        )
+        self._looking = self.analyst()
+        return self._run(self.scan)
+
+    def take(self, analysed: Analysed) -> None:
+        """What was found in a frame; nobody's when its scan has ended."""
+        if self.scan is None or analysed.scan != self.scan.name:
+            return
+        self.scan.add(analysed)
+        if analysed.jpeg is not None and self.show:
+            self._publish(topics.CAMERA_SCAN_IMAGE.message(analysed.jpeg, cam=self.config.name))
+
+    def tick(self, now: float) -> None:
+        """Publishes how far it is."""
+        if self.scan is None:
+            if self._state_at == 0.0:
+                self._state_at = now
+                self._say(ScanState(state="idle", targets=list(self.targets)))
+        elif now - self._state_at >= STATE_S:
+            self._state_at = now
+            self._say(self.scan.state("running", now))
+
+    def ended(self, state: OrderState, error: str | None, now: float) -> None:
+        """The order of the scan has ended: results, when it was done."""
+        scan = self.scan
+        self.close()
+        if scan is None:
+            return
+        self.scan = None
+        if state == "done":
+            self._results(scan)
+        last: Literal["done", "cancelled", "failed"] = (
+            "done" if state == "done" else "cancelled" if state == "cancelled" else "failed"
+        )
+        self._say(scan.state(last, now, error or ""))
+
+    def close(self) -> None:
+        """Ends the processes that look at frames."""
+        if self._looking is not None:
+            self._looking.close()
+            self._looking = None
+
+    def _run(self, scan: Scan) -> Plan[None]:
+        yield from attempt(GetPicture())  # how the frames will be turned, as far as the camera tells
+        yield from scan.plan(lambda frame, jpeg: self._look(scan, frame, jpeg))
+
+    def _look(self, scan: Scan, frame: Frame, jpeg: bytes) -> None:
+        self.frames += 1
+        assert self._looking is not None
+        task = Task(
+            scan=scan.name,
+            number=frame.number,
+            jpeg=jpeg,
+            flip=self.picture.flip,
+            mirror=self.picture.mirror,
+            kind=self.kind,
+            dictionary=self.config.dictionary,
+            targets=scan.targets,
+            draw=self.show,
+        )
+        self._looking.submit(task)
+
+    def _visits(self, order: ScanFor) -> dict[str, Place]:
+        """The places to visit in their order; Refused when there are none, or one is not known."""
+        names = order.places or self.routine
+        if names is None:
+            named = self.places.named
+            names = tuple(shortest(named, self.config.limits, self.bulletin.reading))
+        if not names:
+            raise Refused("no places to visit: save some with SaveAs")
+        return {self.places.find(name): self.places.get(name) for name in names}
+
+    def _results(self, scan: Scan) -> None:
+        for marker, seen in sorted(scan.seen.items()):
+            size = self.config.markers.of(marker)
+            result = sightings.result(self.eye, marker, seen, size, scan.name, self.picture.mode)
+            self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
+            self._publish(topics.CAMERA_MARKER.message(result, cam=self.config.name, marker=marker))
+
+    def _say(self, state: ScanState) -> None:
+        self.bulletin.say(topics.CAMERA_SCAN_STATE, state)
+
+    def _publish(self, message: Message) -> None:
+        self.bulletin.publish(message)

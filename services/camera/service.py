@@ -1,0 +1,210 @@
+"""The service of one camera: orders in, plans advanced on tick, states and results out. It never waits for the camera.
+
+It decides little itself: what an order means is `orders.py`, who has the motors `motors.py`, how to move `move.py`,
+how to scan `scan.py` and `scanner.py`, everything else that can be ordered `chores.py`, what is said `bulletin.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from services import topics
+from services.bus import Message
+from services.camera import answers as life
+from services.camera import orders
+from services.camera.analysis import ANALYSED, Analysed, Analyst
+from services.camera.answers import Answers, Job
+from services.camera.bulletin import Bulletin
+from services.camera.chores import WITHOUT_CAMERA, Chores
+from services.camera.device import REPLY, Sender
+from services.camera.goal import Goal
+from services.camera.health import Health
+from services.camera.motors import Motors
+from services.camera.move import goto
+from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
+from services.camera.pace import Skill
+from services.camera.places import Places
+from services.camera.plan import Plan, Run, Stage, attempt, wait
+from services.camera.requests import GetPicture, Identify, Identity, Picture, Rank, Reading, Refused, Reply, Status
+from services.camera.scanner import Scanner
+from services.camera.settings import Config
+from services.camera.sightings import Eye
+from services.payloads import Order, OrderState, PositionSet
+
+BUSY_S = 0.5  # between two looks whether the motors are free again
+FRESH_S = 2.0  # a reading as old as this still tells where a camera at rest looks
+
+
+class CameraService:
+    """A Service (`runner.py`). `analyst` makes the one that looks at frames, a new one for each scan."""
+
+    def __init__(self, config: Config, sender: Sender, analyst: Callable[[], Analyst], eye: Eye) -> None:
+        self.config = config
+        self.subscribes = tuple(
+            topic.filter_for(cam=config.name)
+            for topic in (topics.CAMERA_ORDER, topics.CAMERA_POSITION_SET, topics.CAMERA_SNAPSHOT_GET)
+        )
+        self.due: float | None = 0.0
+        self.counters: dict[str, int] = {"requests": 0, "failed_requests": 0, "frames": 0}
+        self._out: list[Message] = []
+        publish = self._out.append
+        self.places = Places(config.folder / config.places)
+        self.health = Health(config.name)
+        self.skill = Skill()
+        self.skill.forget_senses(flip=config.picture.flip, mirror=config.picture.mirror)
+        self.bulletin = Bulletin(config.name, self.health, self.places, publish)
+        self.answers = Answers(config.name, publish, self.bulletin.position)
+        self.stage = Stage(sender.submit)
+        self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
+        self.scanner = Scanner(config, self.skill, eye, analyst, self.bulletin, self.places)
+        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin)
+        self._polling = False
+
+    def handle(self, message: Message, now: float) -> Iterable[Message]:
+        """Takes a reply, an analysed frame, or an order."""
+        if message.topic == REPLY and isinstance(message.value, Reply):
+            self._reply(message.value, now)
+        elif message.topic == ANALYSED and isinstance(message.value, Analysed):
+            self.scanner.take(message.value)
+        else:
+            self._read(topics.read(message, now), now)
+        return self._flush()
+
+    def tick(self, now: float) -> Iterable[Message]:
+        """Wakes the plans, and publishes what has changed."""
+        if not self._polling:
+            self._polling = True
+            self.stage.begin(self._poll(now), now, _nobody)
+        self.stage.tick(now)
+        self.motors.tick(now)
+        self.health.moving = self.motors.busy
+        self.counters["frames"] = self.scanner.frames
+        self.scanner.tick(now)
+        self.bulletin.tick(now, self.counters)
+        self.due = min(time for time in (self.bulletin.due, self.stage.due) if time is not None)
+        return self._flush()
+
+    def close(self) -> None:
+        """Ends the processes of a scan that is under way."""
+        self.scanner.close()
+
+    def _flush(self) -> list[Message]:
+        out = list(self._out)
+        self._out.clear()
+        return out
+
+    def _reply(self, reply: Reply, now: float) -> None:
+        self.counters["requests"] += 1
+        self.counters["failed_requests"] += reply.error is not None
+        if reply.request.rank is not Rank.PICTURE:
+            self.health.take(reply)
+        if isinstance(reply.result, Reading):
+            self.bulletin.take(reply.result, reply.received)
+        elif isinstance(reply.result, Picture):
+            self._take_picture(reply.result)
+        elif isinstance(reply.result, Identity):
+            self.bulletin.identity = reply.result
+        self.stage.reply(reply, now)
+
+    def _take_picture(self, picture: Picture) -> None:
+        """The motors follow the picture: when its options changed, which way they turn is to be seen anew."""
+        old, self.scanner.picture = self.scanner.picture, picture
+        if (picture.flip, picture.mirror) != (old.flip, old.mirror):
+            self.skill.forget_senses(flip=picture.flip, mirror=picture.mirror)
+
+    def _poll(self, now: float) -> Plan[None]:
+        """Asks where the camera looks while nobody else does, and who it is after it was away."""
+        met = False
+        while True:
+            now = yield from wait(max(now + 0.05, self.health.next_poll))
+            if self.motors.busy or self.health.rebooting:
+                now = yield from wait(now + BUSY_S)
+                continue
+            now = (yield from attempt(Status())).received
+            if self.health.online and not met:
+                yield from attempt(Identify())
+                now = (yield from attempt(GetPicture())).received
+                if self.bulletin.turning:
+                    self.motors.make_sure(now)
+            met = self.health.online
+
+    def _read(self, read: topics.Read, now: float) -> None:
+        payload = read.payload
+        if read.topic is topics.CAMERA_SNAPSHOT_GET:
+            self.stage.begin(self.chores.snapshot(), now, _nobody)
+        elif isinstance(payload, PositionSet):
+            value = payload.model_dump(exclude={"id", "by"}, exclude_none=True)
+            job = life.job("Position", value, payload.by, payload.id, read.message)
+            self._take(job, LookAt(payload.pan, payload.tilt, payload.zoom), now)
+        elif isinstance(payload, Order):
+            job = life.job(orders.canonical(read.levels["key"]), payload.value, payload.by, payload.id, read.message)
+            try:
+                command = orders.read(job.key, payload.value)
+            except Refused as error:
+                self.answers.tell(job, "refused", str(error))
+            else:
+                self._take(job, command, now)
+
+    def _take(self, job: Job, command: Command, now: float) -> None:
+        job.command = command
+        try:
+            self._check(command)
+        except Refused as error:
+            self.answers.tell(job, "refused", str(error))
+            return
+        self.answers.tell(job, "accepted")
+        if isinstance(command, orders.EndScan) and not self.motors.scanning:
+            self.answers.tell(job, "running")
+            self.answers.tell(job, "done")
+        elif isinstance(command, orders.Halt | orders.EndScan):
+            self.motors.halt(job, now)
+        elif isinstance(command, orders.Motor):
+            self.motors.order(job, now)
+        else:
+            self.answers.tell(job, "running")
+            self.stage.begin(self.chores.plan(command, now), now, lambda run, now: self._chore_ended(job, run))
+
+    def _chore_ended(self, job: Job, run: Run) -> None:
+        if run.error is None:
+            self.answers.tell(job, "done")
+        else:
+            self.answers.tell(job, "refused" if isinstance(run.error, Refused) else "failed", str(run.error))
+
+    def _check(self, command: Command) -> None:
+        """Refused when it can be said before anything is sent that this cannot be done."""
+        free = isinstance(command, WITHOUT_CAMERA | orders.Halt | orders.EndScan)
+        if not free and not self.health.online:
+            raise Refused(f"the camera is {self.health.state}: {self.health.reason}")
+        if isinstance(command, GotoPlace | LookAt):
+            self._goal(command)
+        elif isinstance(command, orders.RemovePlace):
+            self.places.get(command.place)
+        elif isinstance(command, ScanFor):
+            self.scanner.check(command)
+
+    def _goal(self, command: GotoPlace | LookAt) -> Goal:
+        """Where an order wants to look; what it leaves out stays as it is."""
+        here = self.bulletin.known()
+        if isinstance(command, GotoPlace):
+            place = self.places.get(command.place)
+            return self.config.limits.goal(place.pan, place.tilt, place.zoom)
+        pan = here.pan if command.pan is None else command.pan
+        tilt = here.tilt if command.tilt is None else command.tilt
+        zoom = here.zoom if command.zoom is None else command.zoom
+        return self.config.limits.goal(pan, tilt, zoom)
+
+    def _motor_plan(self, command: Command, now: float) -> Plan[object]:
+        if isinstance(command, ScanFor):
+            return self.scanner.plan(command, now)
+        assert isinstance(command, GotoPlace | LookAt)
+        near = self.bulletin.at_rest(now, FRESH_S)
+        until = now + self.config.move_timeout_s
+        return goto(self._goal(command), self.config.limits, self.skill, until, near=near)
+
+    def _motor_ended(self, job: Job, state: OrderState, error: str | None, now: float) -> None:
+        if isinstance(job.command, ScanFor):
+            self.scanner.ended(state, error, now)
+
+
+def _nobody(run: Run, now: float) -> None:
+    """Nobody waits for the end of this plan."""

@@ -1,0 +1,104 @@
+"""A camera's section of the configuration (`cameras.<cam>`): what can be set, and its defaults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, SecretStr, field_validator
+
+from services.camera.goal import Limits
+from services.section import Section
+from services.vision.frames import Mount
+
+Pair = tuple[float, float]
+
+
+class MarkerSizes(Section):
+    """Side of the black square in metres: of every marker, and of those that differ, by id."""
+
+    size: float = Field(default=0.14, gt=0.005, lt=2)
+    sizes: dict[int, float] = {}
+
+    def of(self, marker: int) -> float:
+        """The side of that marker, metres."""
+        return self.sizes.get(marker, self.size)
+
+
+class PictureOptions(Section):
+    """How the camera is set to deliver its picture; what it says itself counts, where it says it."""
+
+    flip: bool = True
+    mirror: bool = True
+
+
+class MountSettings(Section):
+    """How the camera is fixed; frames and signs are those of `vision/frames.py`."""
+
+    position: tuple[float, float, float]  # m, apartment: where the pan axis leaves the mounting plate
+    kind: Literal["ceiling", "shelf"] = "ceiling"
+    yaw_deg: float = 0.0  # azimuth of the optical axis at pan reading 0
+    lean_deg: Pair = (0.0, 0.0)  # about the base's x, y
+    pan_to_tilt_m: Pair = (0.0, 0.0)  # forward, along the pan axis away from the plate
+    tilt_to_lens_m: Pair = (0.0, 0.0)  # along the optical axis, up in the picture
+    sensor_roll_deg: float = 0.0
+
+    def mount(self) -> Mount:
+        """The same for the formulas."""
+        return Mount(**self.model_dump())
+
+
+class Config(Section):
+    """One camera. `name` and `folder` are given by the program."""
+
+    name: str = "ip1"
+    folder: Path = Path()
+    brand: str = "amcrest"  # a module of `camera/brands/`
+    url: str
+    rtsp_port: int = Field(default=554, ge=1, le=65535)
+    user: str = ""
+    password: SecretStr = SecretStr("")
+    channel: Literal[0, 1] | None = None  # of the motors; None: found out
+    camera_info: Path | None = None  # of the upright picture at the widest zoom
+    places: Path = Path("places")  # folder of the report's two files
+    dictionary: str = "DICT_5X5_1000"
+    markers: MarkerSizes = MarkerSizes()
+    targets: tuple[int, ...] = ()
+    picture: PictureOptions = PictureOptions()
+    pan_dead_arc: Pair = (179.0, 186.0)  # readings that the camera cannot reach, degrees
+    tilt_range: Pair = (-10.0, 108.0)
+    zoom_range: Pair = (0.0, 8.0)
+    mount: MountSettings | None = None
+    routine: tuple[str, ...] | None = None  # places that a scan visits, in order; None: all, on the shortest way
+    frames: int = Field(default=4, ge=1, le=50)  # at each place of a scan
+    settle_s: float = Field(default=0.6, ge=0, le=10)  # from rest to the first frame: the picture's own delay
+    stop_early: bool = True  # a scan ends when every target was seen well
+    move_timeout_s: float = Field(default=60.0, gt=1, le=600)
+    workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
+
+    @field_validator("url")
+    @classmethod
+    def is_an_address(cls, text: str) -> str:
+        if not text.startswith(("http://", "https://")) or "@" in text:
+            raise ValueError(f"expected http://host or https://host without a password in it, got {text[:80]!r}")
+        return text
+
+    @field_validator("brand")
+    @classmethod
+    def is_a_brand(cls, text: str) -> str:
+        known = sorted(file.stem for file in (Path(__file__).parent / "brands").glob("[a-z]*.py"))
+        if text not in known:
+            raise ValueError(f"expected one of {', '.join(known)}, got {text!r}")
+        return text
+
+    @field_validator("pan_dead_arc", "tilt_range", "zoom_range")
+    @classmethod
+    def is_a_range(cls, pair: Pair) -> Pair:
+        if pair[0] >= pair[1]:
+            raise ValueError(f"expected [low, high], got {list(pair)}")
+        return pair
+
+    @property
+    def limits(self) -> Limits:
+        """Where this camera can look."""
+        return Limits(self.pan_dead_arc, self.tilt_range, self.zoom_range)

@@ -1,0 +1,106 @@
+"""From what was seen in a scan to its results: the views of each marker, fused into one place in the apartment. Pure.
+
+The geometry is in `vision/pose.py` and `vision/frames.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+
+from services.camera.requests import Reading
+from services.payloads import Point, Quaternion, ScanResult, WeightedQuaternion, stamp
+from services.vision.detect import Detection
+from services.vision.frames import Array, Mount, camera_in_apartment, quaternion
+from services.vision.lens import Lens
+from services.vision.pose import Located, View, locate
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One marker in one frame: `at` when it was taken, `size` of the picture (width, height)."""
+
+    detection: Detection
+    place: str
+    reading: Reading
+    at: float
+    size: tuple[int, int]
+
+    @property
+    def off_centre(self) -> float:
+        """How far from the middle of the picture, as a share of its width."""
+        x, y = np.asarray(self.detection.corners, float).mean(axis=0)
+        width, height = self.size
+        return hypot(x - (width - 1) / 2, y - (height - 1) / 2) / width
+
+
+@dataclass(frozen=True)
+class Eye:
+    """What is known of the camera; `lens` or `mount` None: no positions."""
+
+    camera: str
+    dictionary: str
+    lens: Lens | None
+    mount: Mount | None
+    widest: float = 0.0  # the zoom at which the lens was calibrated
+
+
+def result(eye: Eye, marker: int, seen: Sequence[Sighting], size_m: float, scan: str, mode: str) -> ScanResult:
+    """The result for one marker, from all frames of a scan that show it (at least one)."""
+    best = min(seen, key=lambda sighting: sighting.off_centre)
+    located, why = _located(eye, seen, size_m)
+    return ScanResult(
+        camera=eye.camera,
+        marker=marker,
+        dictionary=eye.dictionary,
+        place=best.place,
+        zoom=best.reading.zoom,
+        frames=len(seen),
+        mode=mode,
+        first_seen=stamp(min(sighting.at for sighting in seen)),
+        stamp=stamp(max(sighting.at for sighting in seen)),
+        scan=scan,
+        why=why,
+        **_geometry(located),
+    )
+
+
+def _located(eye: Eye, seen: Sequence[Sighting], size_m: float) -> tuple[Located | None, str | None]:
+    if eye.lens is None or eye.mount is None:
+        return None, "the camera has no camera_info" if eye.lens is None else "the camera has no mount"
+    plain = [sighting for sighting in seen if sighting.reading.zoom <= eye.widest]
+    if not plain:
+        return None, f"seen only zoomed in: the lens is calibrated at zoom {eye.widest:g}"
+    try:
+        return locate([_view(eye.lens, eye.mount, sighting, size_m) for sighting in plain]), None
+    except ValueError as error:
+        return None, str(error)
+
+
+def _view(lens: Lens, mount: Mount, sighting: Sighting, size_m: float) -> View:
+    pose = camera_in_apartment(mount, sighting.reading.pan, sighting.reading.tilt)
+    corners = np.asarray(sighting.detection.corners, float)
+    return View(lens.scaled(*sighting.size), pose, corners, size_m)
+
+
+def _geometry(located: Located | None) -> dict[str, object]:
+    if located is None:
+        return {"position": None}
+    x, y, z = (float(value) for value in located.position)
+    ways = [
+        WeightedQuaternion(**_quaternion(rotation), weight=float(weight)) for rotation, weight in located.orientations
+    ]
+    return {
+        "position": Point(x=x, y=y, z=z),
+        "covariance": [[float(value) for value in row] for row in located.covariance],
+        "orientation": Quaternion(**ways[0].model_dump(exclude={"weight"})) if len(ways) == 1 else None,
+        "orientations": ways,
+        "distance": float(located.distance),
+    }
+
+
+def _quaternion(rotation: Array) -> dict[str, float]:
+    return dict(zip("xyzw", quaternion(rotation), strict=True))

@@ -1,0 +1,101 @@
+"""Coming to rest, and motions by hand: plans that end with a camera that stands still.
+
+Not here: moves to a place (`move.py`).
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+from services.camera.device import same
+from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.requests import BadLogin, Direction, Locked, Reading, Refused, Reply, Start, Status, Stop
+from services.errors import DeviceError
+
+GAP_S = 0.25  # between two readings that are compared: the slowest speed shows in that time
+REFUSALS = 3
+LOCKED_PAUSE_S = 60.0  # a camera that takes no login takes no stop either, and each try may lock the account
+
+
+def settle(near: Reading | None = None) -> Plan[tuple[Reading, float]]:
+    """Reads until two successive readings are equal and the camera does not say that it moves; the reading, the time.
+
+    Firmware exists that never leaves `Moving`: four equal readings overrule it.
+    """
+    last, equal = near, 0
+    for _ in range(60):
+        reply = yield from ask(Status())
+        reading = cast(Reading, reply.result)
+        equal = equal + 1 if last is not None and same(last, reading) else 0
+        if equal >= 4 or (equal >= 1 and reading.moving is not True):
+            return reading, reply.received
+        last = reading
+        if reply.received - reply.sent < GAP_S:
+            yield from wait(reply.sent + GAP_S)
+    raise DeviceError("the camera does not come to rest")
+
+
+def stop(now: float, *, every: bool = False) -> Plan[Reply]:
+    """Sends a stop until it is confirmed, however long that takes.
+
+    A camera that refuses stops (some do when nothing runs) is looked at instead: standing still is a confirmation.
+    """
+    pause, refusals = 0.1, 0
+    while True:
+        reply = yield from attempt(Stop(every=every))
+        if reply.error is None:
+            return reply
+        refusals += isinstance(reply.error, Refused)
+        if refusals >= REFUSALS and (yield from _stands()):
+            return reply
+        locked = isinstance(reply.error, BadLogin | Locked)
+        yield from wait(reply.received + (LOCKED_PAUSE_S if locked else pause))
+        pause = min(2 * pause, 0.5)
+
+
+def _stands() -> Plan[bool]:
+    try:
+        yield from settle()
+    except DeviceError:
+        return False
+    return True
+
+
+def halt(now: float, *, every: bool = False) -> Plan[Reading]:
+    """Stops, and makes sure that it stands."""
+    while True:
+        yield from stop(now, every=every)
+        try:
+            reading, _ = yield from settle()
+            return reading
+        except DeviceError:
+            every = True
+
+
+class Hold:
+    """A motion by hand for some seconds from the moment that it is confirmed; the end can be put off while it runs."""
+
+    def __init__(self, direction: Direction, speed: int, seconds: float) -> None:
+        self.direction = direction
+        self.speed = speed
+        self.seconds = seconds
+        self.until: float | None = None
+
+    def prolong(self, seconds: float, now: float) -> None:
+        """Lets it run for so long from now."""
+        self.seconds = max(self.seconds, seconds)
+        if self.until is not None:
+            self.until = max(self.until, now + seconds)
+
+    def plan(self) -> Plan[Reading]:
+        """Starts, waits, stops, and returns where it came to rest."""
+        reply = yield from ask(Start(self.direction, self.speed, self.speed))
+        now = reply.received
+        self.until = now + self.seconds
+        while now < self.until:
+            if self.until - now > 1.0:
+                now = (yield from ask(Status())).received
+            now = yield from wait(min(self.until, now + 0.4))
+        yield from stop(now)
+        reading, _ = yield from settle()
+        return reading

@@ -1,0 +1,52 @@
+"""Puts a camera's service together from its configuration, and takes it down so that nothing moves afterwards."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import cast
+
+from services import document
+from services.camera.address import Address
+from services.camera.analysis import Pool
+from services.camera.device import Device
+from services.camera.requests import Camera
+from services.camera.service import CameraService
+from services.camera.settings import Config
+from services.camera.sightings import Eye
+from services.errors import ConfigError
+from services.runner import Post
+from services.vision.lens import Lens
+
+
+@contextmanager
+def start(config: Config, post: Post) -> Iterator[CameraService]:
+    """The service, with its threads to the camera; at the end a stop is sent and confirmed."""
+    address = Address(config.url, config.user, config.password, config.rtsp_port, config.channel)
+    connect = cast(
+        Callable[[Address], Camera], importlib.import_module(f"services.camera.brands.{config.brand}").connect
+    )
+    view = eye(config)
+    device = Device(lambda: connect(address), post)
+    try:
+        service = CameraService(config, device, lambda: Pool(post, config.workers), view)
+        try:
+            yield service
+        finally:
+            service.close()
+    finally:
+        device.close()
+
+
+def eye(config: Config) -> Eye:
+    """What is known of the camera's geometry; ConfigError when its file cannot be used."""
+    lens = None
+    if config.camera_info is not None:
+        file = config.folder / config.camera_info
+        try:
+            lens = Lens.from_camera_info(document.must(document.read(file)))
+        except (ValueError, AttributeError) as error:
+            raise ConfigError([f"{file}:1: {error}"]) from error
+    mount = config.mount.mount() if config.mount else None
+    return Eye(config.name, config.dictionary, lens, mount, config.zoom_range[0])

@@ -1,0 +1,60 @@
+"""Pictures: decoding, setting upright, drawing, and the newest frame of a camera's stream in one slot.
+
+Not here: finding markers (`vision/`), asking for a snapshot (`brands/`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from services.camera.requests import Away
+
+Image = NDArray[np.uint8]
+QUALITY = 80  # of the JPEGs that we make
+
+
+def decode(jpeg: bytes) -> Image:
+    """The picture as BGR (height, width, 3); Away when it is none (the camera sends broken ones at times)."""
+    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    if image is None:
+        raise Away(f"expected a whole JPEG, got {len(jpeg)} bytes that are none")
+    return image.astype(np.uint8, copy=False)
+
+
+def encode(image: Image) -> bytes:
+    """The picture as JPEG."""
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    return data.tobytes()
+
+
+def upright(image: Image, *, flip: bool, mirror: bool, kind: Literal["ceiling", "shelf"]) -> Image:
+    """The picture as somebody standing in the room would see it; `flip` and `mirror` are how it was delivered.
+
+    A ceiling camera hangs head down: its raw picture is turned by 180 degrees, so flipped and mirrored is upright.
+    """
+    down, across = (not flip, not mirror) if kind == "ceiling" else (flip, mirror)
+    if not down and not across:
+        return image
+    return cv2.flip(image, -1 if down and across else 0 if down else 1).astype(np.uint8, copy=False)
+
+
+def drawn(image: Image, found: Sequence[tuple[int, NDArray[np.float64]]]) -> Image:
+    """A copy with each marker's outline (its first corner dotted) and id."""
+    copy = image.copy()
+    for marker, corners in found:
+        points = np.rint(np.asarray(corners, float)).astype(np.int32)
+        cv2.polylines(copy, [points], True, (0, 255, 0), 2)
+        first = (int(points[0][0]), int(points[0][1]))
+        cv2.circle(copy, first, 4, (0, 0, 255), -1)
+        cv2.putText(copy, str(marker), (first[0], first[1] - 8), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (0, 255, 0), 2)
+    return copy
+
+
+def one_thread() -> None:
+    """For worker processes: several, each with one thread, are faster than one with several."""
+    cv2.setNumThreads(1)

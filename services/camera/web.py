@@ -1,0 +1,28 @@
+"""One HTTP connection to a camera: its timeouts, and its errors as ours. What is said there is the brand's."""
+
+from __future__ import annotations
+
+import httpx
+
+from services.camera.address import Address
+from services.camera.digest import Login
+from services.camera.requests import Away
+
+COMMAND = httpx.Timeout(6.0, connect=2.0)
+SNAPSHOT = httpx.Timeout(20.0, connect=2.0)
+
+
+def connection(address: Address, login: Login, transport: httpx.BaseTransport | None = None) -> httpx.Client:
+    """A client with one connection; `transport` replaces the network in tests."""
+    limits = httpx.Limits(max_connections=1, max_keepalive_connections=1)
+    return httpx.Client(
+        base_url=address.url, auth=login, timeout=COMMAND, limits=limits, transport=transport, trust_env=False
+    )
+
+
+def fetch(http: httpx.Client, target: str, timeout: httpx.Timeout = COMMAND) -> httpx.Response:
+    """The answer, whatever its status; Away when there is none. Brackets in the target are sent as they are."""
+    try:
+        return http.get(target, timeout=timeout)
+    except httpx.HTTPError as error:
+        raise Away(f"no answer from the camera: {type(error).__name__} {error}".strip()) from error

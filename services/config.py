@@ -1,0 +1,253 @@
+"""Reads the configuration file into each service's Config, and tells all faults at once, with file and line.
+
+The top of the file: `bus`, `state`, `home` (a file), `default_camera`, and a section for each service, named in
+`registry.py`. What a setting means stands at the Config above the code that uses it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, Field, SecretStr, ValidationError
+
+from services import document, secret_store
+from services.document import Document, Path_
+from services.errors import ConfigError
+from services.home import Home
+from services.registry import REGISTRY, Row
+from services.section import Section
+
+M = TypeVar("M", bound=BaseModel)
+TOP = ("bus", "state", "home", "default_camera")
+INJECTED = ("name", "home", "cameras", "folder")  # see `section.py`
+
+
+class Tls(Section):
+    """Certificates: `ca` checks the broker; `cert` and `key` show who we are, where the broker asks for it."""
+
+    ca: Path
+    cert: Path | None = None
+    key: Path | None = None
+
+
+class BusSettings(Section):
+    """Where the broker is, and the account of each service there (none: anonymous)."""
+
+    host: str = "127.0.0.1"
+    port: int = Field(default=1883, ge=1, le=65535)
+    tls: Tls | None = None
+    accounts: dict[str, SecretStr] = {}
+    keepalive_s: int = Field(default=15, ge=5, le=600)
+
+
+@dataclass(frozen=True)
+class Instance:
+    """One service as this configuration wants it."""
+
+    name: str
+    row: Row
+    config: Section
+
+
+@dataclass(frozen=True)
+class Apartment:
+    """The whole configuration, checked."""
+
+    file: Path
+    bus: BusSettings
+    home: Home
+    state: Path
+    cameras: tuple[str, ...]
+    instances: dict[str, Instance] = field(default_factory=dict)
+
+
+class Top(Section):
+    """The keys at the top of the file that belong to no service."""
+
+    bus: BusSettings = BusSettings()
+    state: Path | None = None
+    home: Path
+    default_camera: str | None = None
+
+
+def load(file: Path, only: tuple[str, ...] | None = None, environment: Mapping[str, str] = os.environ) -> Apartment:
+    """Reads and checks; ConfigError with every fault. `only`: services to run; the others' secrets may be absent."""
+    secret = secret_store.lookup(environment)
+    source = document.read(file, secret)
+    raw = source.value if isinstance(source.value, dict) else {}
+    if not source.faults and not raw:
+        source.fault((), "expected sections such as bus, home and cameras, got nothing")
+    top = _model(Top, {key: raw[key] for key in TOP if key in raw}, source, ())
+    home, home_faults = _home(file.parent / raw["home"]) if isinstance(raw.get("home"), str) else (None, [])
+    cameras = _cameras(raw, source)
+    given = {"home": home, "cameras": cameras, "folder": file.parent}
+    _unknown_sections(raw, source)
+    instances = list(_instances(raw, source, cameras, given))
+    faults = [*_wanted(source.faults, only), *home_faults]
+    if faults or top is None or home is None:
+        raise ConfigError(sorted(dict.fromkeys(faults), key=_by_place))
+    by_name = {instance.name: instance for instance in instances}
+    return Apartment(file, top.bus, home, _state_folder(top, file, environment), cameras, by_name)
+
+
+def _by_place(fault: str) -> tuple[str, int]:
+    file, line, _ = fault.split(":", 2)
+    return file, int(line)
+
+
+def _wanted(faults: list[str], only: tuple[str, ...] | None) -> list[str]:
+    """Without the missing secrets of services that are not to run here (each machine holds only its own)."""
+    if only is None:
+        return faults
+    mine = ("bus.accounts.", *(f"{row.section[0]}." for row in REGISTRY))
+    cams = [name.removeprefix("camera-") for name in only]
+    kept = [
+        *(f"bus.accounts.{name}" for name in only),
+        *(f"cameras.{cam}." for cam in cams),
+        *(f"{name}." for name in only),
+    ]
+
+    def matters(fault: str) -> bool:
+        where = fault.split(": ", 2)[1]
+        foreign = where.startswith(mine) and not any(where.startswith(prefix) for prefix in kept)
+        return not ("expected ${" in fault and foreign)
+
+    return [fault for fault in faults if matters(fault)]
+
+
+def _state_folder(top: Top, file: Path, environment: Mapping[str, str]) -> Path:
+    if top.state is not None:
+        return file.parent / top.state
+    if "STATE_DIRECTORY" in environment:
+        return Path(environment["STATE_DIRECTORY"].split(":")[0])
+    return Path(environment.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "apartment"
+
+
+def _home(file: Path) -> tuple[Home | None, list[str]]:
+    source = document.read(file)
+    home = None if source.faults else _model(Home, source.value or {}, source, ())
+    if home is not None:
+        for path, text in home.faults():
+            source.fault(path, text)
+    return home, source.faults
+
+
+def _cameras(raw: dict[str, Any], source: Document) -> tuple[str, ...]:
+    """The names of the cameras, the default one first."""
+    names = list(raw["cameras"]) if isinstance(raw.get("cameras"), dict) else []
+    default = raw.get("default_camera")
+    if default is not None and default not in names:
+        source.fault(
+            ("default_camera",), f"expected one of the cameras ({', '.join(map(str, names))}), got {default!r}"
+        )
+    return tuple(sorted((str(name) for name in names), key=lambda name: name != default))
+
+
+def _unknown_sections(raw: dict[str, Any], source: Document) -> None:
+    known = (*TOP, *dict.fromkeys(row.section[0] for row in REGISTRY))
+    for key in raw:
+        if key not in known:
+            source.fault((key,), _unknown(key, known))
+    simulators = raw.get("simulators")
+    inner = [row.section[1] for row in REGISTRY if row.section[0] == "simulators"]
+    for key in simulators if isinstance(simulators, dict) else ():
+        if key not in inner:
+            source.fault(("simulators", key), _unknown(key, inner))
+
+
+def _instances(
+    raw: dict[str, Any], source: Document, cameras: tuple[str, ...], given: dict[str, Any]
+) -> Iterator[Instance]:
+    for row in REGISTRY:
+        for camera in cameras if "<cam>" in row.name else ("",):
+            section = tuple(part.replace("<cam>", camera) for part in row.section)
+            settings = _at(raw, section)
+            if settings is None and not (row.default or _at(raw, section[:-1], section[-1])):
+                continue
+            name = row.name.replace("<cam>", camera)
+            config = _config(row, settings or {}, source, section, {**given, "name": camera or name})
+            if config is not None:
+                yield Instance(name, row, config)
+
+
+def _at(raw: Any, section: tuple[str, ...], key: str | None = None) -> Any:
+    """The value at a path of keys; with `key`, whether that key stands there (its value may be empty)."""
+    for part in section:
+        raw = raw.get(part) if isinstance(raw, dict) else None
+    return raw if key is None else isinstance(raw, dict) and key in raw
+
+
+def _config(row: Row, settings: Any, source: Document, section: Path_, given: dict[str, Any]) -> Section | None:
+    model: type[Section] = importlib.import_module(row.module).Config
+    if not isinstance(settings, dict):
+        source.fault(section, f"expected settings, got {settings!r}")
+        return None
+    for key in INJECTED:
+        if key in settings and key in model.model_fields:
+            source.fault((*section, key), "expected no such key here, it is given by the program")
+    wanted = {key: value for key, value in given.items() if key in model.model_fields and value is not None}
+    return _model(model, {**settings, **wanted}, source, section, given=INJECTED)
+
+
+def _model(model: type[M], values: Any, source: Document, path: Path_, given: tuple[str, ...] = ()) -> M | None:
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        for fault in error.errors(include_url=False):
+            if fault["loc"] in [(name,) for name in given] and fault["type"] == "missing":
+                continue  # what is given was faulty itself, and is told there
+            where = (*path, *(part for part in fault["loc"] if not _is_a_tag(part)))
+            source.fault(where, _expected(fault, model))
+        return None
+
+
+def _is_a_tag(part: str | int) -> bool:
+    """pydantic puts the name of a validator or of a union's branch into the path; ours have none in lower case."""
+    return isinstance(part, str) and ("[" in part or part.startswith("function-"))
+
+
+def _expected(fault: Any, model: type[BaseModel]) -> str:
+    """Pydantic's words as ours: `expected ..., got ...`."""
+    last = str(fault["loc"][-1]) if fault["loc"] else ""
+    if fault["type"] == "missing":
+        return "expected a value, got nothing"
+    if fault["type"] == "extra_forbidden":
+        return _unknown(last, _keys_at(model, fault["loc"][:-1]))
+    text = str(fault["msg"]).replace("Value error, ", "").replace("Input should be", "expected")
+    if "password" in last or ", got " in text:
+        return text if text.startswith("expected") else f"expected {text}"
+    return f"{text}, got {_short(fault['input'])}"
+
+
+def _short(value: object) -> str:
+    return text if len(text := repr(value)) <= 80 else f"{text[:77]}..."
+
+
+def _unknown(key: object, known: Any) -> str:
+    near = difflib.get_close_matches(str(key), [str(name) for name in known], n=1)
+    return f"expected a known key{f' (did you mean {near[0]!r}?)' if near else ''}, got {str(key)!r}"
+
+
+def _keys_at(model: type[BaseModel], path: tuple[int | str, ...]) -> tuple[str, ...]:
+    """The keys that a nested model knows, as far as the types tell."""
+    for part in path:
+        annotation = (
+            model.model_fields[part].annotation if isinstance(part, str) and part in model.model_fields else None
+        )
+        inner = next((kind for kind in _kinds(annotation)), None)
+        if inner is not None:
+            model = inner
+    return tuple(name for name in model.model_fields if name not in INJECTED)
+
+
+def _kinds(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in getattr(annotation, "__args__", ()):
+        yield from _kinds(inner)

@@ -1,0 +1,177 @@
+"""Gathers rows in `handle`, commits them in `tick`, in one transaction each turn.
+
+Where nothing is lost: the runner acknowledges a turn's messages after its tick, so what is not committed comes
+again. While the database is away the gathered rows are kept, with their times, and the tick raises Unavailable.
+Not here: what a row is (`rows.py`), which are wanted (`strategies.py`), the SQL (`services/storage/`).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from pydantic import Field, SecretStr, field_validator
+
+from services import topics
+from services.bus import Message
+from services.errors import BadMessage, ConfigError, Unavailable
+from services.home import Home
+from services.persistence import rows, strategies
+from services.persistence.connection import Connection
+from services.persistence.decisions import Decisions
+from services.persistence.strategies import Restore
+from services.runner import Post
+from services.section import Section
+from services.storage import Address, Batch, Row, Storage, open_storage, read_address
+
+log = logging.getLogger(__name__)
+
+CLOCK_STEP_US = 1_000_000  # a clock that steps back more than this is told
+COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "not_finite", "clock_steps", "restored", "reconnects")
+
+
+class Config(Section):
+    """The section `persistence`."""
+
+    url: str  # sqlite:///FILE, mysql://USER@HOST:PORT/DATABASE or mysql://USER@localhost/DATABASE?socket=PATH
+    password: SecretStr | None = None  # of the database's user
+    view_database: str = "OpenHAB"  # where the views with OpenHAB's layout go (MariaDB, MySQL)
+    restore_after_s: float = Field(default=2.0, ge=0)  # how long the broker may take for its retained states
+    name: str = "persistence"
+    home: Home
+    folder: Path = Path()
+
+    @field_validator("url")
+    @classmethod
+    def is_an_address(cls, url: str) -> str:
+        try:
+            read_address(url)
+        except ConfigError as error:
+            raise ValueError("; ".join(fault.removeprefix("url: ") for fault in error.faults)) from error
+        return url
+
+    @property
+    def address(self) -> Address:
+        """Where the database is."""
+        password = self.password.get_secret_value() if self.password else None
+        return read_address(self.url, password=password, view_database=self.view_database, folder=self.folder)
+
+
+@contextmanager
+def start(config: Config, post: Post) -> Iterator[Persistence]:
+    """The service; ConfigError when its database cannot be used. One that is away is waited for in the turns."""
+    if faults := list(strategies.faults(config.home)):
+        raise ConfigError(faults)
+    address = config.address
+    service = Persistence(config, lambda: open_storage(address))
+    service.connection.first()
+    try:
+        yield service
+    finally:
+        service.connection.close()
+
+
+class Persistence:
+    """The service; see `services.runner.Service`."""
+
+    def __init__(self, config: Config, opener: Callable[[], Storage]) -> None:
+        own_status = topics.SERVICE_STATUS.filter_for(service=config.name)  # its echo shows that there is a broker
+        self.subscribes = (*(row.filter for row in topics.TABLE if row.stored), own_status)
+        self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
+        self.connection = Connection(opener, self.counters)
+        self._home = config.home
+        self._decisions = Decisions(config.home, self.counters)
+        self._restore = Restore(self._decisions.restored, config.restore_after_s)
+        self._gathered: list[rows.State | Row] = []
+        self._batch = Batch()  # decided, not committed yet
+        self._time = 0
+        self._learnt = False
+
+    @property
+    def due(self) -> float | None:
+        """When the database is tried again, or the restoring is due."""
+        wanted = [when for when in (self.connection.due, self._restore.due) if when is not None]
+        return min(wanted, default=None)
+
+    def handle(self, message: Message, now: float) -> tuple[Message, ...]:
+        """Takes a message for the next tick."""
+        known = topics.read(message, now)
+        self._restore.begin(now)
+        if known.topic is topics.HOME_STATE and self._restore.saw(known.levels["item"], known.payload):
+            return ()
+        row = rows.read(known, self._next_time(message.received or now), self._home) if known.topic.stored else None
+        if row is not None:
+            self._gathered.append(row)
+        return ()
+
+    def tick(self, now: float) -> list[Message]:
+        """Commits what was gathered; Unavailable while the database is away."""
+        storage = self.connection.storage(now)
+        try:
+            self._learn(storage)
+            self._decide(storage)
+            self._commit(storage)
+        except Unavailable as error:
+            self.connection.lost(error, now)
+            raise
+        self.connection.worked()
+        return self._restored(storage, now)
+
+    def _next_time(self, at: float) -> int:
+        """Microseconds, never the same twice and never back: a clock that steps back must not reorder rows."""
+        microseconds = round(at * 1e6)
+        behind = self._time - microseconds
+        if behind > CLOCK_STEP_US:
+            if not self.counters["clock_steps"]:
+                log.warning("the clock is %.1f s behind what is stored; times go on from there", behind / 1e6)
+            self.counters["clock_steps"] += 1
+        self._time = max(microseconds, self._time + 1)
+        return self._time
+
+    def _learn(self, storage: Storage) -> None:
+        if self._learnt:
+            return
+        last = storage.last_values()
+        self._decisions.learn(last, storage.last_diagnostics())
+        self._time = max([self._time, *(sample.time for sample in last.values())])
+        self._learnt = True
+
+    def _decide(self, storage: Storage) -> None:
+        """From gathered to decided, once; new items are made before, because MariaDB commits at that."""
+        if self._gathered:
+            storage.add_items(self._decisions.new_items(self._gathered, storage.items))
+            self._batch.extend(self._decisions.batch(self._gathered, storage.items))
+            self._gathered = []
+
+    def _commit(self, storage: Storage) -> None:
+        if len(self._batch):
+            self.counters["rows"] += self._write(storage, self._batch)
+            self.counters["batches"] += 1
+            self._batch = Batch()
+
+    def _write(self, storage: Storage, batch: Batch) -> int:
+        """How many rows were written: all, but for one that the database refuses, which halving finds."""
+        try:
+            storage.write(batch)
+            return len(batch)
+        except BadMessage as error:
+            if len(batch) > 1:
+                return sum(self._write(storage, half) for half in batch.halves())
+            log.warning("refused by the database: %s: %.200r", error, batch)
+            self.counters["refused"] += 1
+            return 0
+
+    def _restored(self, storage: Storage, now: float) -> list[Message]:
+        """The last states of items that the broker does not have, retained, said once."""
+        said = []
+        for name in self._restore.missing(now):
+            text = self._decisions.last_text(name, storage.items)
+            if text is not None:
+                self._restore.says(name, text)
+                said.append(replace(topics.HOME_STATE.message(text, item=name), once=True))
+        self.counters["restored"] += len(said)
+        return said

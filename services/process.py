@@ -1,0 +1,136 @@
+"""One service in this process: its bus, its turns until a signal, its log, its READY line.
+
+Not here: starting processes again, that is `supervisor.py`; what a turn is, that is `runner.py`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import json
+import logging
+import os
+import signal
+import ssl
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from services.aside import Aside
+from services.bus import WAKE_TOPIC, Message
+from services.bus.connection import Address
+from services.bus.mqtt import MqttBus
+from services.config import Apartment, BusSettings, Instance, Tls
+from services.runner import Runner
+from services.topics import SERVICE_STATUS
+
+LONGEST_WAIT_S = 1.0
+SUPERVISED = "APARTMENT_SUPERVISED"  # set by the supervisor: end when it ends
+Ready = Callable[[dict[str, Any]], None]
+
+
+def log_to_stderr(level: int = logging.INFO) -> None:
+    """The one log format: time, level, service or module, text."""
+    logging.basicConfig(level=level, stream=sys.stderr, format=LOG_FORMAT, datefmt="%Y-%m-%dT%H:%M:%S", force=True)
+    logging.getLogger("httpx").setLevel(logging.WARNING)  # one line per camera request otherwise
+
+
+LOG_FORMAT = "%(asctime)s.%(msecs)03d %(levelname)-7s %(name)s: %(message)s"
+
+
+def address(settings: BusSettings, client_id: str, account: str, **options: Any) -> Address:
+    """Where the broker is, for a client that uses this account (anonymous without a password for it)."""
+    password = settings.accounts.get(account) or None  # an empty one is none
+    return Address(
+        client_id=client_id,
+        host=settings.host,
+        port=settings.port,
+        user=account if password is not None else None,
+        password=password.get_secret_value() if password is not None else None,
+        tls=tls_context(settings.tls) if settings.tls else None,
+        keepalive_s=settings.keepalive_s,
+        **options,
+    )
+
+
+def tls_context(tls: Tls) -> ssl.SSLContext:
+    """Checks the broker by our CA, host name included, TLS 1.2 or newer."""
+    context = ssl.create_default_context(cafile=str(tls.ca))
+    if tls.cert is not None:
+        context.load_cert_chain(tls.cert, tls.key)
+    return context
+
+
+def serve(apartment: Apartment, name: str, ready: Ready) -> None:
+    """Runs one service until SIGTERM or SIGINT. A bug in it comes out of here as it is."""
+    instance = apartment.instances[name]
+    if os.environ.get(SUPERVISED):
+        _end_with_parent()
+    with _stop_signal() as stopping:
+        if instance.row.on_bus:
+            _on_bus(apartment, instance, stopping, ready)
+        else:
+            _off_bus(instance, stopping, ready)
+
+
+def _off_bus(instance: Instance, stopping: threading.Event, ready: Ready) -> None:
+    """A program of its own, such as the simulated camera: it answers by itself."""
+    with importlib.import_module(instance.row.module).start(instance.config) as addresses:
+        ready(addresses.ready())
+        stopping.wait()
+
+
+def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event, ready: Ready) -> None:
+    row, name = instance.row, instance.name
+    bus = MqttBus(
+        address(apartment.bus, name, name, protocol=row.protocol, durable=row.durable),
+        birth=SERVICE_STATUS.message("online", service=name),
+        will=SERVICE_STATUS.message("offline", service=name),
+    )
+    threading.Thread(target=_wake, args=(bus, stopping), daemon=True, name="stop").start()
+    try:
+        with importlib.import_module(row.module).start(instance.config, bus.post) as service:
+            runner = Runner(name, service, bus, time.time, Aside(apartment.state / name / "aside"))
+            _turns(runner, stopping, lambda: ready(dict(getattr(service, "addresses", {}))))
+    finally:
+        bus.close()
+
+
+def _wake(bus: MqttBus, stopping: threading.Event) -> None:
+    """A thread's body: a signal ends the wait for the next message."""
+    stopping.wait()
+    bus.post(Message(WAKE_TOPIC))
+
+
+def _turns(runner: Runner, stopping: threading.Event, ready: Callable[[], None]) -> None:
+    told = False
+    while not stopping.is_set():
+        runner.turn(min(LONGEST_WAIT_S, max(0.0, runner.due - time.time())))
+        if not told and runner.bus.connected:
+            ready()
+            told = True
+
+
+@contextmanager
+def _stop_signal() -> Iterator[threading.Event]:
+    """An event that SIGTERM and SIGINT set."""
+    stopping = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stopping.set())
+    yield stopping
+
+
+def _end_with_parent() -> None:
+    """Linux sends us SIGTERM when the supervisor dies, however it dies (prctl(2), PR_SET_PDEATHSIG)."""
+    pr_set_pdeathsig = 1
+    ctypes.CDLL(None, use_errno=True).prctl(pr_set_pdeathsig, signal.SIGTERM)
+    if os.getppid() != int(os.environ[SUPERVISED]):
+        os.kill(os.getpid(), signal.SIGTERM)  # it died before we asked
+
+
+def ready_line(name: str, addresses: dict[str, Any]) -> str:
+    """What a program prints once it answers: `READY {json}`."""
+    return f"READY {json.dumps({'name': name, 'pid': os.getpid(), **addresses})}"

@@ -1,0 +1,59 @@
+"""The table of services: what can run, where its code and its configuration are, and how it meets the bus.
+
+Modules are named as texts, so that no service loads another's libraries. A name with `<cam>` stands for one
+service per camera of the configuration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Row:
+    """One service (or one per camera).
+
+    `section` is where its settings stand in the configuration file; without that section it does not run.
+    `group`: services of one group may share a process. `durable`: the broker keeps its messages while it is away.
+    `protocol`: 5, or 4 for MQTT 3.1.1, which costs half the time per message.
+    """
+
+    name: str
+    module: str
+    section: tuple[str, ...]
+    help: str
+    group: str = ""
+    durable: bool = False
+    protocol: Literal[4, 5] = 5
+    on_bus: bool = True
+    plays: str = ""  # the role at the broker that it has besides its own
+    default: bool = False  # runs even when the configuration has no section for it
+
+
+REGISTRY: tuple[Row, ...] = (
+    Row(
+        "simulated-camera",
+        "services.simulators.camera",
+        ("simulators", "camera"),
+        "a camera on the network that is not there",
+        on_bus=False,
+    ),
+    Row(
+        "simulated-home",
+        "services.simulators.home",
+        ("simulators", "home"),
+        "lights, doors and sensors that answer as OpenHAB would",
+        plays="openhab",
+    ),
+    Row(
+        "persistence",
+        "services.persistence",
+        ("persistence",),
+        "writes what happens to the database",
+        durable=True,
+        protocol=4,
+    ),
+    Row("camera-<cam>", "services.camera", ("cameras", "<cam>"), "drives one camera: places, orders, scans"),
+    Row("bridge", "services.bridge", ("bridge",), "maps the bus to ROS 1 topics and back"),
+)

@@ -1,0 +1,132 @@
+"""The simulated apartment as it runs: private peers, the services of `config/simulated.yaml`, one process each.
+
+The demo tells its story, the pytest plugin gives it to tests, the soak kills parts of it. With `real` it uses
+mosquitto, MariaDB and ROS where they are installed, else an embedded broker and SQLite.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+
+from services.config import Apartment, load
+from services.peers import Missing, answers, embedded, free_port, mariadb, mosquitto, ros
+from services.supervisor import Supervisor, command, in_background
+
+CONFIG = Path(__file__).parents[1] / "config"
+USUAL_BROKER_PORT = 1883
+
+
+@dataclass
+class Parts:
+    """What the demo meets: `used` by part, and how to get what is missing."""
+
+    folder: Path
+    environment: dict[str, str] = field(default_factory=dict)
+    used: list[tuple[str, str, str]] = field(default_factory=list)
+    database: mariadb.Server | None = None
+    ros: ros.Master | None = None
+    broker: ExitStack = field(default_factory=ExitStack)
+
+    @property
+    def broker_port(self) -> int:
+        """Where the broker listens."""
+        return int(self.environment["APARTMENT_BROKER_PORT"])
+
+    def note(self, part: str, what: str, missing: Missing | None = None) -> None:
+        """Adds a line to the table that people see first."""
+        self.used.append((part, what, f"{missing}" if missing else ""))
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A running apartment. `ready` is what each service said of itself: pid and addresses."""
+
+    folder: Path
+    config: Path
+    apartment: Apartment
+    parts: Parts
+    supervisor: Supervisor
+    ready: dict[str, Any]
+
+
+@contextmanager
+def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
+    """Starts the peers; they end with the block."""
+    parts = Parts(folder)
+    parts.environment["APARTMENT_STATE"] = str(folder / "state")
+    parts.environment["APARTMENT_CAMERA_PORT"] = str(free_port())
+    parts.environment["APARTMENT_SIDE_DOOR_PORT"] = str(free_port())
+    with ExitStack() as stack:
+        for start in (_start_broker, _start_database, _start_ros):
+            start(stack, parts, real)
+        yield parts
+
+
+@contextmanager
+def services_of(folder: Path, parts: Parts, without: Collection[str] = ()) -> Iterator[Simulated]:
+    """Starts the services and waits until all are ready; they end with the block."""
+    config = folder / "config" / "simulated.yaml"
+    shutil.copytree(CONFIG, config.parent)  # saved places and the like are not to change the repository
+    apartment = load(config, environment={**os.environ, **parts.environment})
+    names = [name for name in apartment.instances if name not in without and (name != "bridge" or parts.ros)]
+    supervisor = Supervisor({name: command(name, config) for name in names}, parts.environment)
+    with in_background(supervisor) as ready:
+        yield Simulated(folder, config, apartment, parts, supervisor, ready)
+
+
+def _start_broker(stack: ExitStack, parts: Parts, real: bool) -> None:
+    port = free_port() if answers(USUAL_BROKER_PORT) or not real else USUAL_BROKER_PORT
+    parts.environment["APARTMENT_BROKER_PORT"] = str(port)
+    stack.enter_context(parts.broker)
+    try:
+        _only_if(real, "mosquitto")
+        start_mosquitto(parts)
+    except Missing as missing:
+        parts.broker.enter_context(embedded.broker(port))
+        parts.note("broker", f"embedded, port {port}", missing)
+    else:
+        parts.note("broker", f"mosquitto, port {port}")
+
+
+def start_mosquitto(parts: Parts) -> None:
+    """Starts it, or starts it again after `parts.broker.close()`: same folder, port, accounts."""
+    broker = mosquitto.private(parts.folder / "mosquitto", port=parts.broker_port, anonymous=True)
+    for account, password in parts.broker.enter_context(broker).passwords.items():
+        parts.environment[f"BUS_{account.replace('-', '_').upper()}_PASSWORD"] = password
+
+
+def _start_database(stack: ExitStack, parts: Parts, real: bool) -> None:
+    try:
+        _only_if(real, "MariaDB")
+        server = stack.enter_context(mariadb.private(parts.folder / "mariadb"))
+    except Missing as missing:
+        parts.environment["APARTMENT_DATABASE"] = f"sqlite:///{parts.folder}/bus.db"
+        parts.note("database", "SQLite, embedded", missing)
+    else:
+        parts.database = server
+        parts.environment["APARTMENT_DATABASE"] = server.url
+        parts.environment["APARTMENT_DATABASE_PASSWORD"] = server.password
+        parts.note("database", f"MariaDB, port {server.port}")
+
+
+def _start_ros(stack: ExitStack, parts: Parts, real: bool) -> None:
+    try:
+        _only_if(real, "ROS")
+        parts.ros = stack.enter_context(ros.private(parts.folder / "ros"))
+    except Missing as missing:
+        parts.note("robot", "no ROS, no bridge", missing)
+    else:
+        parts.environment.update(parts.ros.env)
+        parts.note("robot", f"ROS 1, ROS_MASTER_URI={parts.ros.uri}")
+
+
+def _only_if(real: bool, part: str) -> None:
+    if not real:
+        raise Missing(f"{part} is not wanted here")

@@ -1,0 +1,35 @@
+"""The versions of the schema: one file each in `schema/`, applied in order. Not here: how a database runs them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from importlib import resources
+
+from services.errors import ConfigError
+
+
+def versions(dialect: str) -> dict[int, list[str]]:
+    """The statements of each version, `schema/<dialect>_<number>.sql`, in order."""
+    found = {}
+    for file in resources.files("services.storage").joinpath("schema").iterdir():
+        if match := re.fullmatch(rf"{dialect}_(\d+)\.sql", file.name):
+            found[int(match[1])] = statements(file.read_text(encoding="utf-8"))
+    return dict(sorted(found.items()))
+
+
+def statements(script: str) -> list[str]:
+    """The statements of a script whose texts contain neither `;` nor `--`."""
+    bare = re.sub(r"--[^\n]*", "", script)
+    return [statement.strip() for statement in bare.split(";") if statement.strip()]
+
+
+def migrate(dialect: str, current: int, apply: Callable[[int, list[str]], None]) -> None:
+    """Applies what is newer than `current`; ConfigError when the database is newer than this program."""
+    known = versions(dialect)
+    newest = max(known)
+    if current > newest:
+        raise ConfigError([f"the database has schema version {current}, this program knows {newest}: update it"])
+    for version, script in known.items():
+        if version > current:
+            apply(version, script)

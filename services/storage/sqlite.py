@@ -1,0 +1,215 @@
+"""Storage in one SQLite file: the embedded default. Same tables and views as on MariaDB, in the one file.
+
+One process writes. Not for a network file system, whose locks do not hold.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import astuple, fields
+from typing import Any
+
+from services.errors import BadMessage, ConfigError, Unavailable
+from services.storage import FINAL_STATES, TABLES, Address, Batch, Diagnostic, Item, Sample, Sighting
+from services.storage.migrate import migrate
+
+BUSY_S = 5.0
+SETTINGS = (
+    "PRAGMA journal_mode=WAL",
+    "PRAGMA synchronous=FULL",  # NORMAL can lose what was acknowledged at a power cut
+)
+UNUSABLE = {"SQLITE_CANTOPEN", "SQLITE_NOTADB", "SQLITE_READONLY", "SQLITE_CORRUPT", "SQLITE_PERM"}
+# Local time as text. The fraction only where there is one: as texts, '08:00:00' comes before '08:00:00.000'.
+LOCAL = (
+    "datetime({0}/1000000,'unixepoch','localtime') || "
+    "CASE WHEN {0}/1000%1000 THEN printf('.%03d',{0}/1000%1000) ELSE '' END"
+)
+VIEW_VALUES = {  # of a kind; all others show their text
+    "Number": "num",
+    "Dimmer": "CAST(num AS INTEGER)",
+    "Rollershutter": "CAST(num AS INTEGER)",
+    "DateTime": LOCAL.format("CAST(num AS INTEGER)"),
+}
+CONFLICT = {
+    "sighting": "DO NOTHING",
+    "diagnostic": "DO NOTHING",
+    "camera_order": f"DO UPDATE SET error=excluded.error, state=excluded.state WHERE state NOT IN {FINAL_STATES}",
+    "scan": "DO UPDATE SET state=excluded.state, found=excluded.found, frames_taken=excluded.frames_taken, "
+    "frames_analysed=excluded.frames_analysed, ended=excluded.ended WHERE ended IS NULL",
+}
+SAMPLE = "SELECT i.name, s.time, s.num, s.text FROM item i"
+# Without the word CROSS the planner reads every sample: 400 times slower.
+LAST_VALUES = (
+    f"{SAMPLE} CROSS JOIN sample s ON s.item_id=i.item_id "
+    "AND s.time=(SELECT MAX(time) FROM sample m WHERE m.item_id=i.item_id)"
+)
+LAST_DIAGNOSTICS = (
+    "SELECT component, time, level, message, details FROM diagnostic d "
+    "WHERE time=(SELECT MAX(time) FROM diagnostic m WHERE m.component=d.component)"
+)
+
+
+@contextmanager
+def _translated(*, opening: bool = False) -> Iterator[None]:
+    """sqlite3's errors as ours; a misuse of the library is a bug and stays what it is."""
+    try:
+        yield
+    except (sqlite3.IntegrityError, sqlite3.DataError, OverflowError) as error:
+        raise BadMessage(f"the database refuses a value: {error}") from error
+    except sqlite3.ProgrammingError:
+        raise
+    except sqlite3.DatabaseError as error:
+        if opening and getattr(error, "sqlite_errorname", "") in UNUSABLE:
+            raise ConfigError([f"the database cannot be used: {error}"]) from error
+        raise Unavailable(f"database: {error}") from error
+
+
+def open_address(address: Address) -> SqliteStorage:
+    """Opens or makes the file and brings the tables up to date; see `Storage` and `open_storage`."""
+    try:
+        address.path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError([f"the database's folder cannot be made: {error}"]) from error
+    with _translated(opening=True):
+        storage = SqliteStorage(sqlite3.connect(address.path, timeout=BUSY_S, isolation_level=None))
+        try:
+            storage.prepare()
+        except BaseException:
+            storage.close()
+            raise
+    return storage
+
+
+class SqliteStorage:
+    """See `Storage` for what each method promises."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._connection = connection
+        self._items: dict[str, Item] = {}
+
+    @property
+    def items(self) -> dict[str, Item]:
+        """See `Storage`."""
+        return self._items
+
+    def prepare(self) -> None:
+        """Sets up the connection, applies newer versions of the schema and learns the items."""
+        for setting in SETTINGS:
+            self._connection.execute(setting)
+        with self._transaction():
+            known = self._rows("SELECT 1 FROM sqlite_master WHERE name='schema_version'")
+            current = self._rows("SELECT COALESCE(MAX(version), 0) FROM schema_version")[0][0] if known else 0
+            migrate("sqlite", current, self._apply)
+        self._load_items()
+
+    def add_items(self, items: Iterable[Item]) -> None:
+        """See `Storage`."""
+        with _translated():
+            with self._transaction():
+                for item in items:
+                    self._add_item(item)
+            self._load_items()
+
+    def write(self, batch: Batch) -> None:
+        """See `Storage`."""
+        ids = {name: item.item_id for name, item in self._items.items()}
+        with _translated(), self._transaction():
+            self._connection.executemany(
+                "INSERT INTO sample VALUES (?, ?, ?, ?) ON CONFLICT DO NOTHING",
+                ((ids[sample.item], sample.time, sample.num, sample.text) for sample in batch.samples),
+            )
+            for row in batch.rows:
+                self._connection.execute(INSERT[TABLES[type(row)]], astuple(row))
+
+    def last(self, item: str) -> Sample | None:
+        """See `Storage`."""
+        found = self.samples(item, limit=1)
+        return found[0] if found else None
+
+    def last_values(self) -> dict[str, Sample]:
+        """See `Storage`."""
+        with _translated():
+            return {row[0]: Sample(*row) for row in self._rows(LAST_VALUES)}
+
+    def last_diagnostics(self) -> dict[str, Diagnostic]:
+        """See `Storage`."""
+        with _translated():
+            return {row[0]: Diagnostic(*row) for row in self._rows(LAST_DIAGNOSTICS)}
+
+    def samples(
+        self, item: str, *, since: int | None = None, until: int | None = None, limit: int | None = None
+    ) -> list[Sample]:
+        """See `Storage`."""
+        wanted: dict[str, int | None] = {"s.time>=?": since, "s.time<?": until}
+        bounds = {condition: bound for condition, bound in wanted.items() if bound is not None}
+        where = " AND ".join(["i.name=?", *bounds])
+        with _translated():
+            rows = self._rows(
+                f"{SAMPLE} CROSS JOIN sample s ON s.item_id=i.item_id WHERE {where} ORDER BY s.time DESC LIMIT ?",
+                item, *bounds.values(), -1 if limit is None else limit,
+            )  # fmt: skip
+        return [Sample(*row) for row in reversed(rows)]
+
+    def sightings(self, marker: int, limit: int) -> list[Sighting]:
+        """See `Storage`."""
+        columns = ", ".join(field.name for field in fields(Sighting))
+        with _translated():
+            rows = self._rows(
+                f"SELECT {columns} FROM sighting WHERE marker=? ORDER BY stamp DESC LIMIT ?", marker, limit
+            )
+        return [Sighting(*row) for row in rows]
+
+    def close(self) -> None:
+        """See `Storage`."""
+        self._connection.close()
+
+    # -- inside
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        self._connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+            self._connection.execute("COMMIT")
+        finally:
+            if self._connection.in_transaction:
+                self._connection.execute("ROLLBACK")
+
+    def _rows(self, statement: str, *values: Any) -> list[tuple[Any, ...]]:
+        return self._connection.execute(statement, values).fetchall()
+
+    def _apply(self, version: int, script: list[str]) -> None:
+        for statement in script:
+            self._connection.execute(statement)
+        self._connection.execute("INSERT INTO schema_version VALUES (?, ?, '')", (version, time.time_ns() // 1000))
+
+    def _load_items(self) -> None:
+        rows = self._rows("SELECT name, kind, unit, item_id FROM item")
+        self._items = {row[0]: Item(*row) for row in rows}
+
+    def _add_item(self, item: Item) -> None:
+        """The kind follows, and the unit stays once it is known; the view is made anew."""
+        ((item_id,),) = self._rows(
+            "INSERT INTO item (name, kind, unit) VALUES (?, ?, ?) ON CONFLICT DO UPDATE SET kind=excluded.kind, "
+            "unit=COALESCE(unit, excluded.unit) RETURNING item_id",
+            item.name, item.kind, item.unit,
+        )  # fmt: skip
+        value = VIEW_VALUES.get(item.kind, "text")
+        shown = "num IS NOT NULL" if item.kind in VIEW_VALUES else "text NOT IN ('UNDEF','NULL')"
+        self._connection.execute(f'DROP VIEW IF EXISTS "Item{item_id}"')
+        self._connection.execute(
+            f'CREATE VIEW "Item{item_id}" AS SELECT {LOCAL.format("time")} AS Time, {value} AS Value '
+            f"FROM sample WHERE item_id={item_id} AND {shown}"
+        )
+
+
+def _insert(row: type[Any], table: str) -> str:
+    columns = [field.name for field in fields(row)]
+    marks = ", ".join("?" * len(columns))
+    return f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({marks}) ON CONFLICT {CONFLICT[table]}"
+
+
+INSERT = {table: _insert(row, table) for row, table in TABLES.items()}

@@ -1,0 +1,149 @@
+"""Starts one process per service and starts the fallen again, with backoff. It holds no state that matters.
+
+Not here: what a service does (`process.py`, `runner.py`). Several light services may share a process (`group`).
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from services.process import SUPERVISED
+
+log = logging.getLogger(__name__)
+
+SETTLED_S = 10.0  # a service that lived so long starts again at once
+BACKOFF_S = (0.2, 30.0)  # after a short life: first, longest; doubled each time
+GRACE_S = 5.0  # between SIGTERM and SIGKILL
+
+
+@dataclass
+class Child:
+    """One process and how it fares."""
+
+    name: str
+    command: Sequence[str]
+    process: subprocess.Popen[str] | None = None
+    started: float = 0.0
+    failures: int = 0
+    start_at: float | None = 0.0
+    ready: dict[str, Any] | None = None
+    restarts: int = field(default=-1)
+
+
+def command(name: str, config: Path) -> list[str]:
+    """How one service is started."""
+    return [sys.executable, "-m", "services", "serve", name, "--config", str(config)]
+
+
+class Supervisor:
+    """Watches its children from one thread; one thread per child only reads what it prints."""
+
+    def __init__(self, commands: Mapping[str, Sequence[str]], environment: Mapping[str, str] | None = None) -> None:
+        self.children = {name: Child(name, line) for name, line in commands.items()}
+        self._environment = {**os.environ, **(environment or {}), SUPERVISED: str(os.getpid())}
+        self._news: queue.SimpleQueue[tuple[str, Child | None, str]] = queue.SimpleQueue()
+        self._stopping = False
+
+    def stop(self) -> None:
+        """Asks `run` to end; from any thread or signal handler."""
+        self._stopping = True
+        self._news.put(("stop", None, ""))
+
+    def run(self, all_ready: Callable[[dict[str, Any]], None], tell: Callable[[str], None] | None = None) -> None:
+        """Until `stop`. `all_ready` gets every child's READY once, when the last is ready."""
+        told = False
+        try:
+            while not self._stopping:
+                self._start_what_is_due(time.monotonic())
+                self._listen(self._until_next_start())
+                if not told and all(child.ready is not None for child in self.children.values()):
+                    told = True
+                    all_ready({child.name: child.ready for child in self.children.values()})
+        finally:
+            self._end_all()
+
+    def _start_what_is_due(self, now: float) -> None:
+        for child in self.children.values():
+            if child.start_at is not None and child.start_at <= now:
+                self._start(child, now)
+
+    def _start(self, child: Child, now: float) -> None:
+        child.process = subprocess.Popen(
+            child.command, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, env=self._environment, text=True,
+            start_new_session=True,
+        )  # fmt: skip
+        child.started, child.start_at, child.ready = now, None, None
+        child.restarts += 1
+        threading.Thread(target=self._read, args=(child, child.process), daemon=True, name=child.name).start()
+
+    def _read(self, child: Child, process: subprocess.Popen[str]) -> None:
+        """A thread's body: passes on what the child prints, and that it ended."""
+        assert process.stdout is not None
+        for line in process.stdout:
+            self._news.put(("line", child, line))
+        self._news.put(("ended", child, str(process.wait())))
+
+    def _until_next_start(self) -> float:
+        waits = [child.start_at - time.monotonic() for child in self.children.values() if child.start_at is not None]
+        return max(0.0, min(waits, default=3600.0))
+
+    def _listen(self, timeout: float) -> None:
+        try:
+            kind, child, text = self._news.get(timeout=timeout)
+        except queue.Empty:
+            return
+        if child is not None and kind == "line" and text.startswith("READY "):
+            child.ready = json.loads(text.removeprefix("READY "))
+        elif child is not None and kind == "ended" and not self._stopping:
+            self._plan_restart(child, int(text))
+
+    def _plan_restart(self, child: Child, code: int) -> None:
+        now = time.monotonic()
+        child.failures = 0 if now - child.started > SETTLED_S else child.failures + 1
+        pause = 0.0 if child.failures == 0 else min(BACKOFF_S[0] * 2 ** (child.failures - 1), BACKOFF_S[1])
+        child.start_at, child.process = now + pause, None
+        log.error("%s ended with %s; again in %.1f s", child.name, _outcome(code), pause)
+
+    def _end_all(self) -> None:
+        processes = [child.process for child in self.children.values() if child.process is not None]
+        for process in processes:
+            if process.poll() is None:
+                process.send_signal(signal.SIGTERM)
+        end = time.monotonic() + GRACE_S
+        for process in processes:
+            try:
+                process.wait(max(0.0, end - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                log.error("pid %d did not end within %.0f s, killed", process.pid, GRACE_S)
+                process.kill()
+                process.wait()
+
+
+def _outcome(code: int) -> str:
+    return f"signal {signal.Signals(-code).name}" if code < 0 else f"exit {code}"
+
+
+@contextmanager
+def in_background(supervisor: Supervisor) -> Iterator[dict[str, Any]]:
+    """Runs a supervisor in a thread; yields what the children said once all are ready."""
+    ready: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+    thread = threading.Thread(target=supervisor.run, args=(ready.put,), name="supervisor", daemon=True)
+    thread.start()
+    try:
+        yield ready.get(timeout=60.0)
+    finally:
+        supervisor.stop()
+        thread.join(GRACE_S + 5.0)

@@ -1,0 +1,96 @@
+"""What a row of the table of topics is: pattern, kind, payload, roles; and the messages that it makes.
+
+Not here: the rows, and reading what comes; that is `topics.py`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+from pydantic import BaseModel
+
+from services.bus import Message
+from services.errors import BadMessage
+
+STALE_AFTER_S = 5.0  # contract section 2: an older command is refused
+
+
+class Kind(Enum):
+    """What a topic is for; it alone decides retain, QoS and expiry."""
+
+    STATE = "state"  # retained, the latest wins
+    EVENT = "event"  # happened, never retained
+    COMMAND = "command"  # wanted; never retained, refused when late
+    BLOB = "blob"  # a picture, QoS 0
+
+
+LEVELS = {
+    "item": r"[A-Za-z_][A-Za-z0-9_]*",
+    "cam": r"[a-z][a-z0-9_]*",
+    "robot": r"[a-z][a-z0-9_]*",
+    "service": r"[a-z0-9_-]+",
+    "key": r"[A-Za-z]+",
+    "marker": r"[0-9]{1,4}",
+    "component": r"[A-Za-z0-9_-]+(?:/[A-Za-z0-9_-]+)*",
+}
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One row of the table. `writers` and `readers` are roles (`ROLES`); `<service>` and `<cam>` in a role name
+    stand for the level of that name, so that a service owns its own topics only."""
+
+    pattern: str
+    kind: Kind
+    payload: type[BaseModel] | type[str] | type[bytes]
+    writers: tuple[str, ...]
+    readers: tuple[str, ...]
+    meaning: str
+    stored: bool = False
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of the levels that vary, in order."""
+        return tuple(re.findall(r"<(\w+)>", self.pattern))
+
+    @cached_property
+    def filter(self) -> str:
+        """The MQTT filter of all its topics."""
+        return re.sub(r"<\w+>", "+", self.pattern.replace("<component>", "#"))
+
+    @cached_property
+    def regex(self) -> re.Pattern[str]:
+        """Matches a whole topic; one group per level that varies."""
+        literal = re.sub(r"<(\w+)>", lambda m: f"(?P<{m[1]}>{LEVELS[m[1]]})", self.pattern)
+        return re.compile(literal)
+
+    def name(self, **levels: object) -> str:
+        """The topic with these levels; BadMessage when one of them is not what the pattern allows."""
+        topic = re.sub(r"<(\w+)>", lambda m: str(levels[m[1]]), self.pattern)
+        if not self.regex.fullmatch(topic):
+            raise BadMessage(f"{topic!r} is not a topic like {self.pattern}")
+        return topic
+
+    def message(self, payload: BaseModel | str | bytes, **levels: object) -> Message:
+        """The message that says `payload` there, with the flags of its kind."""
+        return Message(
+            topic=self.name(**levels),
+            payload=encode(payload),
+            retain=self.kind is Kind.STATE,
+            qos=0 if self.kind is Kind.BLOB else 1,
+            expires_s=int(STALE_AFTER_S) if self.kind in (Kind.COMMAND, Kind.BLOB) else None,
+        )
+
+    def filter_for(self, **levels: str) -> str:
+        """The filter with some levels given: `camera/ip1/order/+`."""
+        return re.sub(r"<(\w+)>", lambda m: levels.get(m[1], "#" if m[1] == "component" else "+"), self.pattern)
+
+
+def encode(payload: BaseModel | str | bytes) -> bytes:
+    """Bytes on the wire: JSON of a model, UTF-8 of a text."""
+    if isinstance(payload, BaseModel):
+        return payload.model_dump_json().encode()
+    return payload.encode() if isinstance(payload, str) else payload

@@ -1,0 +1,170 @@
+"""`make bench`: figures as ratios against a floor measured in the same run, as a table and as `bench.json`.
+
+Nothing here passes or fails by a time; a figure is read by people, beside its floor.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import statistics
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import paho.mqtt.client as paho
+from rich.console import Console
+from rich.table import Table
+
+from services.aside import Aside
+from services.bus import Message
+from services.bus.connection import Address
+from services.bus.mqtt import MqttBus
+from services.peers import mosquitto
+from services.runner import Runner
+
+MESSAGES = 20_000
+RUNS = 5
+TOPIC = "home/Kitchen_Light/state"
+
+
+@dataclass
+class Figure:
+    """One row: `ratio` is `value` over `floor`."""
+
+    name: str
+    unit: str
+    value: float
+    floor: float
+    floor_is: str
+    wanted: float
+
+    @property
+    def ratio(self) -> float:
+        return self.value / self.floor
+
+
+class Nothing:
+    """A service that does nothing, until it has seen enough."""
+
+    subscribes = (TOPIC,)
+    due = None
+
+    def __init__(self) -> None:
+        self.seen = 0
+        self.first = self.last = 0.0
+
+    def handle(self, message: Message, now: float) -> Iterable[Message]:
+        self.seen += 1
+        return ()
+
+    def tick(self, now: float) -> Iterable[Message]:
+        return ()
+
+
+def blast(port: int, start: Any, protocol: int) -> None:
+    """A process of its own: MESSAGES at QoS 1, as fast as the broker takes them."""
+    client = paho.Client(paho.CallbackAPIVersion.VERSION2, client_id="publisher", protocol=protocol)
+    client.max_inflight_messages_set(1000)
+    client.connect("127.0.0.1", port)
+    client.loop_start()
+    start.wait()
+    for number in range(MESSAGES):
+        info = client.publish(TOPIC, f"{number}", qos=1)
+    info.wait_for_publish(120)
+    client.disconnect()
+    client.loop_stop()
+
+
+def bare(port: int, protocol: int, go: Callable[[], None]) -> float:
+    """The floor: a paho subscriber that only counts and lets paho acknowledge each message. Messages per second."""
+    done, times = threading.Event(), [0.0, 0.0]
+    count = 0
+
+    def on_message(_client: Any, _data: Any, _message: Any) -> None:
+        nonlocal count
+        count += 1
+        if count == 1:
+            times[0] = time.perf_counter()
+        if count == MESSAGES:
+            times[1] = time.perf_counter()
+            done.set()
+
+    client = paho.Client(paho.CallbackAPIVersion.VERSION2, client_id="bare", protocol=protocol)
+    client.on_message = on_message
+    client.on_subscribe = lambda *_: go()
+    client.connect("127.0.0.1", port)
+    client.subscribe(TOPIC, qos=1)
+    client.loop_start()
+    assert done.wait(120), f"only {count} of {MESSAGES} came"
+    client.disconnect()
+    client.loop_stop()
+    return (MESSAGES - 1) / (times[1] - times[0])
+
+
+def ours(port: int, protocol: int, go: Callable[[], None]) -> float:
+    """Bus, runner and a service that does nothing. Messages per second."""
+    bus = MqttBus(Address("ours", port=port, protocol=protocol))  # type: ignore[arg-type]
+    service = Nothing()
+    runner = Runner("ours", service, bus, time.time, Aside())
+    while not bus.connected:
+        runner.turn(0.05)
+    runner.turn(0.2)
+    go()
+    while service.seen == 0:
+        runner.turn(0.05)
+    first, already = time.perf_counter(), service.seen
+    while service.seen < MESSAGES:
+        runner.turn(0.05)
+    last = time.perf_counter()
+    bus.close()
+    return (MESSAGES - already) / (last - first)
+
+
+def rates(port: int, protocol: int, run: Callable[[int, int, Callable[[], None]], float]) -> float:
+    """One run with a fresh publisher."""
+    context = multiprocessing.get_context("spawn")
+    start = context.Event()
+    publisher = context.Process(target=blast, args=(port, start, protocol))
+    publisher.start()
+    rate = run(port, protocol, start.set)
+    publisher.join(60)
+    return rate
+
+
+def bus_and_runner(folder: Path, runs: int) -> list[Figure]:
+    """QoS 1 through the bus, the runner and a service that does nothing, over MQTT 3.1.1 and 5."""
+    figures = []
+    with mosquitto.private(folder, anonymous=True) as broker:
+        for protocol, name in ((4, "3.1.1"), (5, "5")):
+            pairs = [(rates(broker.port, protocol, bare), rates(broker.port, protocol, ours)) for _ in range(runs)]
+            floor, value = (statistics.median(column) for column in zip(*pairs, strict=True))
+            figures.append(
+                Figure(f"bus and runner, MQTT {name}, QoS 1", "msg/s", value, floor, "a bare paho subscriber", 0.8)
+            )
+    return figures
+
+
+def main() -> None:
+    """Runs all, prints the table, writes `bench.json`."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--runs", type=int, default=RUNS, help="runs of each; the median counts")
+    arguments.add_argument("--json", type=Path, default=Path("bench.json"))
+    given = arguments.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        figures = bus_and_runner(Path(folder), given.runs)
+    table = Table("figure", "value", "floor", "ratio", "wanted", "the floor is")
+    for figure in figures:
+        table.add_row(figure.name, f"{figure.value:,.0f} {figure.unit}", f"{figure.floor:,.0f} {figure.unit}",
+                      f"{figure.ratio:.2f}", f">= {figure.wanted}", figure.floor_is)  # fmt: skip
+    Console().print(table)
+    given.json.write_text(json.dumps([{**asdict(figure), "ratio": figure.ratio} for figure in figures], indent=1))
+
+
+if __name__ == "__main__":
+    main()

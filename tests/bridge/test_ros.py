@@ -1,0 +1,189 @@
+"""The bridge on a real ROS master, seen by the tools that everyone has: rostopic, and the master's own API."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+import xmlrpc.client
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from services.peers import free_port, ros, wait_until
+from tests.bridge.conftest import PATIENCE_S, BridgeProcess
+
+pytestmark = pytest.mark.ros
+Run = Callable[..., BridgeProcess]
+LAMP = {"Lamp": {"type": "Switch", "label": "Lamp"}, "Door": {"type": "Contact", "label": "Door"}}
+NUMBERS = {f"Number_{index}": {"type": "Number", "label": "A number"} for index in range(200)}
+KEY_VALUE = "diagnostic_msgs/KeyValue"
+
+
+def rostopic(master: ros.Master, *arguments: str) -> str:
+    """What `rostopic` prints."""
+    done = subprocess.run(
+        ["rostopic", *arguments], env={**os.environ, **master.env}, capture_output=True, text=True, timeout=PATIENCE_S,
+        check=True,
+    )  # fmt: skip
+    return done.stdout
+
+
+def pub(master: ros.Master, topic: str, kind: str, value: str) -> None:
+    """Says it once, to whoever is there within 3 s (`-1`)."""
+    rostopic(master, "pub", "-1", topic, kind, value)
+
+
+def publishers(master: ros.Master, topic: str) -> list[str]:
+    with xmlrpc.client.ServerProxy(master.uri) as proxy:
+        state: Any = proxy.getSystemState("/test")
+    return next((nodes for name, nodes in state[2][0] if name == topic), [])
+
+
+def test_a_new_subscriber_gets_every_state_and_then_what_happens(master: ros.Master, run_bridge: Run) -> None:
+    bridge = run_bridge(master.env, NUMBERS)
+    for index, item in enumerate(NUMBERS):
+        bridge.hears(f"home/{item}/state", str(index))
+    bridge.registers(1)
+    first = Echo(master, len(NUMBERS) + 1)
+    second = Echo(master, len(NUMBERS) + 1)
+    for echo in (first, second):
+        echo.wait_for(len(NUMBERS))
+        assert dict(echo.pairs()) == {item: str(index) for index, item in enumerate(NUMBERS)}
+    bridge.hears("home/Number_0/state", "21.5")
+    for echo in (first, second):
+        assert echo.rest()[-1] == ("Number_0", "21.5")
+
+
+def test_our_log_is_still_ours_when_the_node_is_up(master: ros.Master, run_bridge: Run) -> None:
+    bridge = run_bridge(master.env, LAMP)
+    bridge.registers(1)
+    bridge.hears("home/Lamp/state", "BLUE")
+    log = master.folder / "bridge.log"
+    wait_until(lambda: "dropped: " in log.read_text(), "the line", PATIENCE_S)
+    lines = log.read_text().splitlines()
+    assert lines[0] == f"INFO service.py ROS up: {master.uri} pid {master.pid}"
+    assert len(lines) == 2, "nothing of rospy's talk"
+
+
+class Echo:
+    """A `rostopic echo` of /iot_updates that ends after so many messages."""
+
+    def __init__(self, master: ros.Master, messages: int) -> None:
+        self._out = master.folder / f"echo-{time.monotonic_ns()}"
+        with self._out.open("wb") as out:
+            self._process = subprocess.Popen(
+                ["rostopic", "echo", "-n", str(messages), "/iot_updates"],
+                env={**os.environ, **master.env, "PYTHONUNBUFFERED": "1"}, stdout=out,
+            )  # fmt: skip
+
+    def pairs(self) -> list[tuple[str, str]]:
+        texts = [line.split(": ", 1)[1].strip('"') for line in self._out.read_text().splitlines() if ": " in line]
+        return list(zip(texts[::2], texts[1::2], strict=False))
+
+    def wait_for(self, messages: int) -> None:
+        wait_until(lambda: self._out.read_text().count("---") >= messages, f"{messages} messages", PATIENCE_S)
+
+    def rest(self) -> list[tuple[str, str]]:
+        assert self._process.wait(PATIENCE_S) == 0
+        return self.pairs()
+
+
+def test_what_a_robot_says_arrives_or_is_refused_with_the_reason(master: ros.Master, run_bridge: Run) -> None:
+    bridge = run_bridge(master.env, LAMP)
+    bridge.registers(1)
+    pub(master, "/iot_command", KEY_VALUE, "{key: Lamp, value: 'ON'}")
+    bridge.says("home/Lamp/command", lambda text: text == "ON")
+    pub(master, "/ip_camera_position", "geometry_msgs/Point", "{x: 41.1, y: 34.5, z: 0}")
+    bridge.says("camera/ip1/position/set", lambda text: '"pan":41.1' in text)
+    pub(master, "/iot_command", KEY_VALUE, "{key: Door, value: 'OPEN'}")
+    bridge.says("diagnostics/bridge", lambda text: "takes no commands" in text)
+    assert "takes no commands" in bridge.said[-1][2]
+
+
+def test_it_comes_back_after_the_master_was_killed(master: ros.Master, run_bridge: Run) -> None:
+    bridge = run_bridge(master.env, LAMP)
+    bridge.hears("home/Lamp/state", "ON")
+    for turn in (1, 2, 3):
+        bridge.registers(turn)
+        assert 'value: "ON"' in rostopic(master, "echo", "-n1", "/iot_updates")
+        seen = len(bridge.said)
+        pub(master, "/iot_command", KEY_VALUE, f"{{key: Lamp, value: '{'ON' if turn % 2 else 'OFF'}'}}")
+        bridge.says("home/Lamp/command", lambda text: text in ("ON", "OFF"), since=seen)
+        master.kill()
+        master.start()
+        back = time.monotonic()
+        wait_until(lambda: publishers(master, "/iot_updates") == ["/iot_bridge"], "registered", PATIENCE_S)
+        assert time.monotonic() - back < 2.0
+
+
+def test_without_a_master_at_the_start_nothing_is_lost(tmp_path: Path, run_bridge: Run) -> None:
+    absent = ros.Master(free_port(), tmp_path / "ros")
+    absent.folder.mkdir()
+    bridge = run_bridge(absent.env, LAMP)
+    bridge.hears("home/Lamp/state", "ON")
+    bridge.hears("camera/ip1/motion", '{"value": 1, "since": "2026-01-31T07:05:00.123Z"}')
+    bridge.says("diagnostics/bridge", lambda text: "no ROS master" in text and '"to_ros":"2"' in text)
+    with ros.private(absent.folder, absent.port) as master:
+        bridge.registers(1)
+        assert 'value: "ON"' in rostopic(master, "echo", "-n1", "/iot_updates")
+        assert "level: 1" in rostopic(master, "echo", "-n1", "/ip_camera_motion_alarm")
+        diagnostics = rostopic(master, "echo", "-n1", "/diagnostics")
+        assert "stamp" in diagnostics
+
+
+def test_a_master_that_hangs_holds_up_neither_the_home_nor_the_end(master: ros.Master, run_bridge: Run) -> None:
+    bridge = run_bridge(master.env, LAMP)
+    bridge.registers(1)
+    os.kill(master.pid, signal.SIGSTOP)
+    try:
+        bridge.says("diagnostics/bridge", lambda text: "no ROS master" in text)
+        bridge.hears("home/Lamp/state", "ON")
+        bridge.says("diagnostics/bridge", lambda text: '"to_ros":"1"' in text)
+        assert bridge.end() < 5.0
+    finally:
+        os.kill(master.pid, signal.SIGCONT)
+
+
+def test_the_older_of_two_bridges_with_one_name_ends_and_says_why(master: ros.Master, run_bridge: Run) -> None:
+    older = run_bridge(master.env, LAMP)
+    older.registers(1)
+    newer = run_bridge(master.env, LAMP)
+    newer.registers(1)
+    assert older.process.wait(PATIENCE_S) == 1
+
+
+def test_a_scan_result_is_on_ros_in_its_own_types(master: ros.Master, run_bridge: Run) -> None:
+    bridge = run_bridge(master.env, LAMP)
+    bridge.registers(1)
+    topic = "/ip_camera_scan/result/pose"
+    echo = subprocess.Popen(
+        ["rostopic", "echo", "-n1", topic], env={**os.environ, **master.env}, stdout=subprocess.PIPE, text=True
+    )
+    result = (
+        '{"camera":"ip1","marker":582,"dictionary":"DICT_5X5_1000","place":"Kitchen","scan":"s1",'
+        '"position":{"x":1.5,"y":2,"z":0.5},"covariance":[[1e-4,0,0],[0,2e-4,0],[0,0,3e-4]],'
+        '"orientation":{"x":0,"y":0,"z":0,"w":1},"first_seen":"2026-01-31T07:05:00.123Z",'
+        '"stamp":"2026-01-31T07:05:00.123Z"}'
+    )
+    with echo:
+        wait_until(lambda: _told(bridge, result, echo), "the pose", PATIENCE_S)
+        assert echo.stdout
+        said = echo.stdout.read()
+    assert 'frame_id: "apartment"' in said
+    assert "secs: 1769843100" in said
+    assert "x: 1.5" in said
+    assert "0.0003" in said
+
+
+def _told(bridge: BridgeProcess, result: str, echo: subprocess.Popen[str]) -> bool:
+    """Scan results are events: said again until the echo has found its way to the bridge."""
+    bridge.hears("camera/ip1/scan/result", result)
+    try:
+        echo.wait(0.3)
+    except subprocess.TimeoutExpired:
+        return False
+    return True

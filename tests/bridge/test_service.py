@@ -1,0 +1,274 @@
+"""The service with a node in memory: lists of messages in and out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from services.bridge import Config, start
+from services.bridge.node import LINK, Link
+from services.bridge.service import Bridge
+from services.bridge.simulated import SimulatedNode
+from services.bus import Message
+from services.errors import BadMessage
+
+CONFIG = Path(__file__).parents[2] / "config"
+NOW = 1000.0
+HOME = {
+    "items": {
+        "Lamp": {"type": "Switch", "label": "Lamp"},
+        "Temp": {"type": "Number:Temperature", "label": "Temperature", "read_only": True},
+        "Door": {"type": "Contact", "label": "Door"},
+        "Note": {"type": "String", "label": "Note"},
+        "Private": {"type": "Switch", "label": "Not for robots", "ros": False},
+    }
+}
+RESULT = {
+    "camera": "ip1", "marker": 582, "dictionary": "DICT_5X5_1000", "place": "Kitchen",
+    "position": {"x": 1.0, "y": 2.0, "z": 0.5}, "covariance": [[1e-4, 0, 0], [0, 2e-4, 0], [0, 0, 3e-4]],
+    "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}, "first_seen": "2026-01-31T07:05:00.123Z",
+    "stamp": "2026-01-31T07:05:00.123Z", "scan": "s1",
+}  # fmt: skip
+
+
+class Driven:
+    """The service, its node, and what it posted to itself, delivered at once."""
+
+    def __init__(self, service: Bridge, posted: list[Message]) -> None:
+        self.service = service
+        self.posted = posted
+        assert isinstance(service.node, SimulatedNode)
+        self.node = service.node
+
+    def hears(self, topic: str, payload: str | dict[str, Any], now: float = NOW, **flags: Any) -> list[tuple[str, Any]]:
+        """A bus message; returns what ROS is told."""
+        text = payload if isinstance(payload, str) else json.dumps(payload)
+        self.node.published.clear()
+        assert not list(self.service.handle(Message(topic, text.encode(), received=now, **flags), now))
+        return list(self.node.published)
+
+    def robot_says(self, topic: str, key: str, value: str, now: float = NOW) -> list[tuple[str, str]]:
+        """A KeyValue on a ROS topic; returns what the bus is told."""
+        self.node.send(topic, {"key": key, "value": value})
+        published = [out for message in self.take() for out in self.service.handle(message, now)]
+        return [(message.topic, message.payload.decode()) for message in published]
+
+    def take(self) -> list[Message]:
+        taken, self.posted[:] = list(self.posted), []
+        return taken
+
+    def own_health(self, now: float) -> dict[str, Any]:
+        (message,) = self.service.tick(now)
+        assert (message.topic, message.retain) == ("diagnostics/bridge", True)
+        health: dict[str, Any] = json.loads(message.payload)
+        return health
+
+
+@pytest.fixture
+def bridge() -> Iterator[Driven]:
+    config = Config.model_validate({"home": HOME, "cameras": ("ip1", "ip2"), "folder": CONFIG, "simulated": True})
+    posted: list[Message] = []
+    with start(config, posted.append) as service:
+        driven = Driven(service, posted)
+        for message in driven.take():
+            assert not list(service.handle(message, NOW))
+        list(service.tick(NOW))
+        yield driven
+
+
+def test_it_asks_for_what_the_rules_need(bridge: Driven) -> None:
+    assert set(bridge.service.subscribes) == {
+        "home/+/state", "diagnostics/#", "camera/ip1/scan/result", "camera/ip2/scan/result",
+        "camera/ip1/motion", "camera/ip2/motion",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("item", "state"), [("Lamp", "ON"), ("Temp", "21.5 °C"), ("Temp", "UNDEF"), ("Note", "")])
+def test_a_state_is_an_update_for_the_robot(bridge: Driven, item: str, state: str) -> None:
+    assert bridge.hears(f"home/{item}/state", state) == [("/iot_updates", {"key": item, "value": state})]
+
+
+def test_an_item_outside_group_ros_stays_at_home(bridge: Driven) -> None:
+    assert bridge.hears("home/Private/state", "ON") == []
+    assert bridge.hears("home/Unknown/state", "ON") == []
+
+
+def test_a_state_that_its_item_cannot_have_is_refused(bridge: Driven) -> None:
+    with pytest.raises(BadMessage, match="expected one of ON, OFF"):
+        bridge.hears("home/Lamp/state", "21.5")
+
+
+def test_a_new_subscriber_is_first_sent_every_current_state_and_only_it(bridge: Driven) -> None:
+    early: list[Any] = []
+    late: list[Any] = []
+    bridge.node.subscribe("/iot_updates", early.append)
+    for item, state in (("Lamp", "ON"), ("Door", "OPEN"), ("Lamp", "OFF")):
+        bridge.hears(f"home/{item}/state", state)
+    bridge.node.subscribe("/iot_updates", late.append)
+    bridge.hears("home/Door/state", "CLOSED")
+    assert [f"{fields['key']} {fields['value']}" for fields in late] == ["Lamp OFF", "Door OPEN", "Door CLOSED"]
+    assert [f"{fields['key']} {fields['value']}" for fields in early] == [
+        "Lamp ON", "Door OPEN", "Lamp OFF", "Door CLOSED",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("topic", ["/iot_command", "/iot_set"])
+def test_refresh_says_everything_again_to_all(bridge: Driven, topic: str) -> None:
+    bridge.hears("home/Lamp/state", "ON")
+    bridge.hears("home/Door/state", "OPEN")
+    bridge.node.published.clear()
+    assert bridge.robot_says(topic, "ROS_COMMAND", "REFRESH") == []
+    assert list(bridge.node.published) == [
+        ("/iot_updates", {"key": "Lamp", "value": "ON"}),
+        ("/iot_updates", {"key": "Door", "value": "OPEN"}),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("topic", "key", "value", "said"),
+    [
+        ("/iot_command", "Lamp", "ON", ("home/Lamp/command", "ON")),
+        ("/iot_command", "Note", "hello", ("home/Note/command", "hello")),
+        ("/iot_set", "Door", "OPEN", ("home/Door/set", "OPEN")),
+        ("/iot_set", "Temp", "UNDEF", ("home/Temp/set", "UNDEF")),
+    ],
+)
+def test_a_robots_word_reaches_the_home(bridge: Driven, topic: str, key: str, value: str, said: Any) -> None:
+    assert bridge.robot_says(topic, key, value) == [said]
+
+
+@pytest.mark.parametrize(
+    ("topic", "key", "value", "reason"),
+    [
+        ("/iot_command", "Door", "OPEN", "takes no commands"),
+        ("/iot_command", "Temp", "20", "read only"),
+        ("/iot_command", "Lamp", "UNDEF", "use `set`"),
+        ("/iot_command", "Lamp", "BLUE", "expected one of ON, OFF"),
+        ("/iot_command", "Private", "ON", "expected an item of group ROS"),
+        ("/iot_command", "Nobody", "ON", "expected an item of group ROS"),
+        ("/iot_command", "ROS_COMMAND", "DANCE", "expected an item of group ROS"),
+        ("/iot_set", "Lamp", "BLUE", "expected one of ON, OFF"),
+        ("/iot_set", "Lamp/state", "ON", "without / "),
+        ("/iot_set", "#", "ON", "without / "),
+        ("/iot_set", "", "ON", "1 to 128 characters"),
+        ("/iot_set", "x" * 200, "ON", "1 to 128 characters"),
+        ("/iot_set", "a\tb", "ON", "control characters"),
+        ("/ip_camera_order", "Go To", "Kitchen", "no topic like"),
+    ],
+)
+def test_a_refused_word_is_told_on_the_diagnostics(
+    bridge: Driven, topic: str, key: str, value: str, reason: str
+) -> None:
+    with pytest.raises(BadMessage, match=reason):
+        bridge.robot_says(topic, key, value, NOW + 0.5)
+    health = bridge.own_health(NOW + 0.5)
+    assert (health["level"], health["values"]["refused"]) == (1, "1")
+    assert topic in health["message"]
+    assert reason in health["message"]
+    assert bridge.service.counters["refused"] == 1
+
+
+def test_the_warning_passes(bridge: Driven) -> None:
+    with pytest.raises(BadMessage):
+        bridge.robot_says("/iot_command", "Door", "OPEN")
+    assert bridge.own_health(NOW + 5)["level"] == 1
+    assert bridge.own_health(NOW + 11)["level"] == 0
+
+
+def test_a_flood_of_refusals_does_not_become_one_of_diagnostics(bridge: Driven) -> None:
+    said = 0
+    for step in range(1000):
+        with pytest.raises(BadMessage):
+            bridge.robot_says("/iot_command", "Door", "OPEN", NOW + step / 1000)
+        said += len(list(bridge.service.tick(NOW + step / 1000)))
+    assert said <= 6
+
+
+def test_orders_and_positions_reach_the_camera_they_name(bridge: Driven) -> None:
+    ((topic, order),) = bridge.robot_says("/ip_camera_order", "Goto", "Kitchen")
+    assert (topic, json.loads(order)["value"]) == ("camera/ip1/order/Goto", "Kitchen")
+    ((topic, _),) = bridge.robot_says("/ip2/ip_camera_order", "Scan", "ON")
+    assert topic == "camera/ip2/order/Scan"
+    bridge.node.send("/ip_camera_position", {"x": 41.0, "y": 34.5, "z": 0.0})
+    (message,) = bridge.service.handle(bridge.take()[0], NOW)
+    assert message.topic == "camera/ip1/position/set"
+    assert json.loads(message.payload)["pan"] == 41.0
+
+
+def test_a_scan_result_is_place_position_and_pose(bridge: Driven) -> None:
+    place, position, pose = bridge.hears("camera/ip1/scan/result", RESULT)
+    assert place == ("/ip_camera_scan/result/place", {"key": 582, "value": "Kitchen"})
+    assert position == ("/ip_camera_scan/result/position", {"x": 1.0, "y": 2.0, "z": 0.5})
+    assert pose[0] == "/ip_camera_scan/result/pose"
+    assert pose[1]["header"] == {"stamp": "2026-01-31T07:05:00.123Z", "frame_id": "apartment"}
+    assert pose[1]["pose"]["pose"] == {"position": RESULT["position"], "orientation": RESULT["orientation"]}
+    covariance = pose[1]["pose"]["covariance"]
+    assert [covariance[7 * axis] for axis in range(6)] == [1e-4, 2e-4, 3e-4, 0.03, 0.03, 0.03]
+    assert len(covariance) == 36
+
+
+def test_a_result_without_a_position_is_a_place_only(bridge: Driven) -> None:
+    said = bridge.hears("camera/ip2/scan/result", {**RESULT, "camera": "ip2", "position": None, "why": "too far"})
+    assert [topic for topic, _ in said] == ["/ip2/ip_camera_scan/result/place"]
+
+
+@pytest.mark.parametrize(("value", "level"), [(0, 0), (1, 1), (-1, 2)])
+def test_motion_is_a_status_with_its_value(bridge: Driven, value: int, level: int) -> None:
+    ((topic, status),) = bridge.hears("camera/ip1/motion", {"value": value, "since": "2026-01-31T07:05:00.123Z"})
+    assert (topic, status["level"], status["values"][0]) == (
+        "/ip_camera_motion_alarm", level, {"key": "motion", "value": value},
+    )  # fmt: skip
+
+
+def test_diagnostics_are_one_array_a_second_and_turn_stale(bridge: Driven) -> None:
+    bridge.hears(
+        "diagnostics/camera/ip1", {"level": 1, "message": "slow", "values": {"fps": "3"}, "hardware_id": "ip1"}
+    )
+    bridge.hears("diagnostics/persistence", {"level": 0, "message": "ok"}, NOW + 4)
+    list(bridge.service.tick(NOW + 0.5))
+    list(bridge.service.tick(NOW + 4))
+    list(bridge.service.tick(NOW + 6))
+    arrays = [fields for topic, fields in bridge.node.published if topic == "/diagnostics"]
+    assert [array["header"]["stamp"] for array in arrays] == [NOW + 4, NOW + 6]
+    assert arrays[0]["status"][0] == {
+        "level": 1, "name": "camera: ip1", "message": "slow", "hardware_id": "ip1",
+        "values": [{"key": "fps", "value": "3"}],
+    }  # fmt: skip
+    assert [(status["name"], status["level"]) for status in arrays[1]["status"]] == [
+        ("camera: ip1", 3), ("persistence: health", 0),
+    ]  # fmt: skip
+
+
+def test_without_a_master_it_says_so_and_the_home_goes_on(bridge: Driven) -> None:
+    away = Message(LINK, value=Link(up=False, text="connection refused", registrations=1))
+    assert not list(bridge.service.handle(away, NOW + 2))
+    health = bridge.own_health(NOW + 2)
+    assert (health["level"], health["message"]) == (2, "no ROS master: connection refused")
+    assert bridge.hears("home/Lamp/state", "ON", NOW + 2)
+
+
+def test_a_node_that_was_shut_down_ends_the_service(bridge: Driven) -> None:
+    gone = Message(LINK, value=Link(up=False, text="shut down from outside", ended=True))
+    assert not list(bridge.service.handle(gone, NOW))
+    with pytest.raises(RuntimeError, match="shut down from outside"):
+        list(bridge.service.tick(NOW))
+
+
+def test_one_rules_fault_does_not_keep_the_others_from_theirs(bridge: Driven) -> None:
+    with pytest.raises(BadMessage, match=r"covariance\.0\.1"):
+        bridge.hears("camera/ip1/scan/result", {**RESULT, "covariance": [[1e-4]]})
+    assert [topic for topic, _ in bridge.node.published] == [
+        "/ip_camera_scan/result/place", "/ip_camera_scan/result/position",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("topic", ["/bridge/link", "/ros/iot_command", "home/a/b/c", "$SYS/x", ""])
+def test_a_topic_that_only_looks_like_ours_is_no_crash(bridge: Driven, topic: str) -> None:
+    try:
+        assert bridge.hears(topic, "payload") == []
+    except BadMessage:
+        assert topic == "home/a/b/c"

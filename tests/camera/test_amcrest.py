@@ -1,0 +1,287 @@
+"""The Amcrest driver: what is sent byte for byte, and every form of answer that firmware gives."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+
+import httpx
+import pytest
+from pydantic import SecretStr
+
+from services.camera.address import Address
+from services.camera.brands import amcrest
+from services.camera.digest import Challenge, authorization, read_challenge
+from services.camera.requests import (
+    Away,
+    BadLogin,
+    Direction,
+    GetPicture,
+    GotoPreset,
+    Identify,
+    Identity,
+    Locked,
+    Picture,
+    Reading,
+    Reboot,
+    Refused,
+    Request,
+    SavePreset,
+    SetPicture,
+    Snapshot,
+    Start,
+    Status,
+    Stop,
+)
+
+NEWER = (
+    "status.Action=Preset\r\nstatus.MoveStatus=Idle\r\nstatus.PTS=0\r\nstatus.Postion[0]=91.600000\r\n"
+    "status.Postion[1]=-2.600000\r\nstatus.Postion[2]=1.000000\r\nstatus.ZoomStatus=Idle\r\n"
+)
+SHORT = "status.Postion[0]=29.5\r\nstatus.Postion[1]=13.6\r\nstatus.Zoom=2\r\nstatus.ZoomValue=0\r\n"
+SPELLED = NEWER.replace("Postion", "Position").replace("MoveStatus=Idle", "MoveStatus=Moving")
+
+
+class Web:
+    """The camera's side: answers by the target, remembers what it was asked."""
+
+    def __init__(self, **answers: str) -> None:
+        self.asked: list[str] = []
+        self.headers: list[httpx.Headers] = []
+        self.answer: Callable[[str], httpx.Response] = lambda target: httpx.Response(200, text="OK\r\n")
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        target = request.url.raw_path.decode()
+        self.asked.append(target)
+        self.headers.append(request.headers)
+        return self.answer(target)
+
+
+def camera(web: Web, channel: int | None = 1) -> amcrest.Amcrest:
+    address = Address("http://192.0.2.10", "admin", SecretStr("secret123"), channel=channel)
+    return amcrest.Amcrest(address, httpx.MockTransport(web))
+
+
+@pytest.mark.parametrize(
+    ("request_", "target"),
+    [
+        (Start(Direction.LEFT, 3), "ptz.cgi?action=start&channel=1&code=Left&arg1=0&arg2=3&arg3=0"),
+        (Start(Direction.UP, 9), "ptz.cgi?action=start&channel=1&code=Up&arg1=0&arg2=8&arg3=0"),
+        (Start(Direction.LEFT_UP, 3, 5), "ptz.cgi?action=start&channel=1&code=LeftUp&arg1=5&arg2=3&arg3=0"),
+        (Start(Direction.RIGHT_DOWN, 0), "ptz.cgi?action=start&channel=1&code=RightDown&arg1=1&arg2=1&arg3=0"),
+        (Start(Direction.ZOOM_IN, 4), "ptz.cgi?action=start&channel=1&code=ZoomTele&arg1=0&arg2=0&arg3=0"),
+        (Start(Direction.ZOOM_OUT), "ptz.cgi?action=start&channel=1&code=ZoomWide&arg1=0&arg2=0&arg3=0"),
+        (GotoPreset(7), "ptz.cgi?action=start&channel=1&code=GotoPreset&arg1=0&arg2=7&arg3=0"),
+        (SavePreset(7), "ptz.cgi?action=start&channel=1&code=SetPreset&arg1=0&arg2=7&arg3=0"),
+        (Reboot(), "magicBox.cgi?action=reboot"),
+    ],
+)
+def test_each_request_is_one_target(request_: Request, target: str) -> None:
+    web = Web()
+    camera(web).send(request_)
+    assert web.asked == [f"/cgi-bin/{target}"]
+
+
+def test_a_stop_carries_the_code_that_was_started() -> None:
+    web = Web()
+    device = camera(web)
+    device.send(Start(Direction.RIGHT_UP, 3, 2))
+    device.send(Stop())
+    assert web.asked[1] == "/cgi-bin/ptz.cgi?action=stop&channel=1&code=RightUp&arg1=0&arg2=0&arg3=0"
+
+
+def test_a_stop_of_unknown_motion_stops_every_code_although_some_are_refused() -> None:
+    web = Web()
+    web.answer = lambda target: httpx.Response(200, text="OK\r\n" if "code=Left&" in target else "Error\r\n")
+    camera(web).send(Stop())
+    assert len(web.asked) == len(Direction)
+
+
+def test_brackets_go_out_as_they_are() -> None:
+    web = Web()
+    with pytest.raises(Refused):
+        camera(web).send(SetPicture(flip=True))
+    assert "VideoInOptions[0].Flip=true&VideoInOptions[0].NightOptions.Flip=true" in web.asked[0]
+
+
+@pytest.mark.parametrize(
+    ("body", "reading"),
+    [
+        (NEWER, Reading(91.6, -2.6, 1.0, False)),
+        (SPELLED, Reading(91.6, -2.6, 1.0, True)),
+        (SHORT, Reading(29.5, 13.6, 2.0, None)),
+        (NEWER + "status.ZoomStatus=Zooming\r\n", Reading(91.6, -2.6, 1.0, True)),
+    ],
+)
+def test_every_form_of_status_is_read(body: str, reading: Reading) -> None:
+    web = Web()
+    web.answer = lambda target: httpx.Response(200, text=body)
+    assert camera(web).send(Status()) == reading
+
+
+@pytest.mark.parametrize("works", [1, 0])
+def test_the_channel_is_found_by_asking_for_the_status_with_1_then_0(works: int) -> None:
+    web = Web()
+    good = httpx.Response(200, text=NEWER)
+    bad = httpx.Response(400, text="Error\r\nBad Request!\r\n")
+    web.answer = lambda target: good if f"channel={works}" in target else bad
+    device = camera(web, channel=None)
+    device.send(Status())
+    device.send(Status())
+    assert [target[-1] for target in web.asked] == (["1", "1"] if works else ["1", "0", "0"])
+
+
+@pytest.mark.parametrize(
+    ("body", "version"),
+    [
+        ("version=2.420.AC00.15.R\r\nBuildDate=2016-09-08\r\n", "2.420.AC00.15.R 2016-09-08"),
+        ("version=2.800.0000016.0.R,build:2020-06-05\r\n", "2.800.0000016.0.R 2020-06-05"),
+    ],
+)
+def test_both_forms_of_the_version_are_read(body: str, version: str) -> None:
+    web = Web()
+    bodies = {"getDeviceType": "type=IP3M-941W\r\n", "getSerialNo": "sn=AMC0000000000001\r\n"}
+    web.answer = lambda target: httpx.Response(200, text=bodies.get(target.split("action=")[1], body))
+    assert camera(web).send(Identify()) == Identity("IP3M-941W", "AMC0000000000001", version)
+
+
+@pytest.mark.parametrize(
+    ("status", "body", "error"),
+    [
+        (200, "Error\r\n", Refused),
+        (200, "Error\r\nBad Request!\r\n", Refused),
+        (400, "Error\r\nBad Request!\r\n", Refused),
+        (501, "Error\r\nNot Implemented!\r\n", Refused),
+        (200, "name=ok-error\r\n", Refused),
+        (401, "Error\r\nInvalid Authority!\r\n", Refused),
+        (401, "", BadLogin),
+        (401, "Error\r\nUser Locked! 1700 s\r\n", Locked),
+        (500, "anything", Away),
+    ],
+)
+def test_an_answer_is_judged_by_status_and_body(status: int, body: str, error: type[Exception]) -> None:
+    web = Web()
+    web.answer = lambda target: httpx.Response(status, text=body)
+    with pytest.raises(error):
+        camera(web).send(Start(Direction.LEFT))
+
+
+def test_no_answer_means_away() -> None:
+    def refuse(request: httpx.Request) -> httpx.Response:
+        raise httpx.ConnectError("refused")
+
+    device = amcrest.Amcrest(Address("http://192.0.2.10", "a", SecretStr("b")), httpx.MockTransport(refuse))
+    with pytest.raises(Away, match="no answer"):
+        device.send(Status())
+
+
+def test_a_snapshot_that_is_no_jpeg_is_an_error_although_the_status_is_200() -> None:
+    web = Web()
+    web.answer = lambda target: httpx.Response(200, text="Error: busy")
+    with pytest.raises((Away, Refused)):
+        camera(web).send(Snapshot())
+
+
+def test_the_mode_is_written_where_the_firmware_keeps_it() -> None:
+    web = Web()
+    bodies = {
+        "name=VideoInOptions": "table.VideoInOptions[0].Flip=true\r\ntable.VideoInOptions[0].Mirror=false\r\n",
+        "name=VideoInDayNight": "table.VideoInDayNight[0][0].Mode=BlackWhite\r\n",
+    }
+    web.answer = lambda target: httpx.Response(200, text=bodies.get(target.split("&")[-1], "OK\r\n"))
+    device = camera(web)
+    assert device.send(GetPicture()) == Picture(True, False, "bw")
+    device.send(SetPicture(mode="bw"))
+    assert any("VideoInDayNight[0][2].Mode=BlackWhite" in target for target in web.asked)
+
+
+def test_the_digest_is_the_one_computed_by_hand() -> None:
+    challenge = Challenge(
+        "digest", "Login to AMC0000000000001", "1083253606", "720000000000000000000007a9", "auth", count=1
+    )
+    uri = "/cgi-bin/magicBox.cgi?action=getDeviceType"
+    header = authorization(challenge, "admin", "secret123", "GET", uri, "0a4f113b")
+    assert 'response="d0800548eff4f05c60eec55986965032"' in header
+    assert "qop=auth, nc=00000001" in header
+
+
+@pytest.mark.parametrize(
+    ("header", "nonce", "opaque", "qop"),
+    [
+        ('Digest realm="Login to A",qop="auth",nonce="1",opaque="7"', "1", "7", "auth"),
+        ('Digest realm="DH_0, x", nonce="2", stale=FALSE, qop="auth,auth-int"', "2", None, "auth"),
+        ('Digest realm="Login to B", nonce="3"', "3", None, None),
+    ],
+)
+def test_challenges_of_every_firmware_are_read(header: str, nonce: str, opaque: str | None, qop: str | None) -> None:
+    challenge = read_challenge([header])
+    assert challenge is not None
+    assert (challenge.nonce, challenge.opaque, challenge.qop) == (nonce, opaque, qop)
+
+
+class Guarded(Web):
+    """A camera that checks Digest; each nonce may be used `uses` times."""
+
+    def __init__(self, password: str = "secret123", uses: int = 1000) -> None:
+        super().__init__()
+        self.password, self.uses, self.nonce, self.used = password, uses, 0, 0
+        self.refused = 0
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        response = super().__call__(request)
+        given = request.headers.get("authorization", "")
+        self.used += 1
+        uri = request.url.raw_path.decode()
+        good = f'response="{self._expected(uri)}"' in given and self.used <= self.uses
+        if good and f"nc={self.used:08x}" in given:
+            return response
+        self.refused += 1
+        self.nonce, self.used = self.nonce + 1, 0
+        challenge = f'Digest realm="Login to A",qop="auth",nonce="{self.nonce}",opaque=""'
+        return httpx.Response(401, headers={"WWW-Authenticate": challenge})
+
+    def _expected(self, uri: str) -> str:
+        def digest(text: str) -> str:
+            return hashlib.md5(text.encode()).hexdigest()
+
+        first, second = digest(f"admin:Login to A:{self.password}"), digest(f"GET:{uri}")
+        return digest(f"{first}:{self.nonce}:{self.used:08x}:c:auth:{second}")
+
+
+def guarded(web: Guarded) -> amcrest.Amcrest:
+    device = camera(web)
+    device.login.cnonce = lambda: "c"
+    return device
+
+
+def test_a_nonce_is_used_again_with_the_next_count() -> None:
+    web = Guarded()
+    device = guarded(web)
+    for _ in range(20):
+        device.send(Reboot())
+    assert (len(web.asked), web.refused) == (21, 1)
+
+
+def test_a_camera_that_takes_each_nonce_once_is_answered_with_one_repeat() -> None:
+    web = Guarded(uses=1)
+    device = guarded(web)
+    for _ in range(5):
+        device.send(Reboot())
+    assert len(web.asked) == 10
+
+
+def test_a_wrong_password_is_tried_once_and_told_without_the_password() -> None:
+    web = Guarded(password="another")
+    with pytest.raises(BadLogin) as caught:
+        guarded(web).send(Reboot())
+    assert len(web.asked) == 2
+    assert "secret123" not in str(caught.value)
+    assert "secret123" not in repr(Address("http://192.0.2.10", "admin", SecretStr("secret123")))
+
+
+def test_a_camera_that_only_takes_basic_gets_basic() -> None:
+    web = Web()
+    plain = httpx.Response(401, headers={"WWW-Authenticate": 'Basic realm="camera"'})
+    web.answer = lambda target: httpx.Response(200, text="OK") if "authorization" in web.headers[-1] else plain
+    camera(web).send(Reboot())
+    assert web.headers[-1]["authorization"].startswith("Basic ")

@@ -1,0 +1,96 @@
+"""The threads that talk to the camera: what overtakes what, and that nothing moves after the end."""
+
+from __future__ import annotations
+
+import queue
+import threading
+
+from services.bus import Message
+from services.camera.device import Device
+from services.camera.requests import Away, Direction, Reading, Refused, Reply, Request, Snapshot, Start, Status, Stop
+
+WAIT_S = 5.0
+
+
+class Slow:
+    """A camera whose requests wait for leave; it forgets the first `deaf` stops."""
+
+    def __init__(self, *, deaf: int = 0) -> None:
+        self.leave = threading.Event()
+        self.got: list[Request] = []
+        self.entered: queue.Queue[Request] = queue.Queue()
+        self.deaf = deaf
+        self.moving = False
+
+    def send(self, request: Request) -> object:
+        self.entered.put(request)
+        assert self.leave.wait(WAIT_S)
+        self.got.append(request)
+        if isinstance(request, Stop) and self.deaf > 0:
+            self.deaf -= 1
+            raise Away("no answer")
+        self.moving = (self.moving or isinstance(request, Start)) and not isinstance(request, Stop)
+        return Reading(10.0, 20.0, 0.0, self.moving) if isinstance(request, Status) else None
+
+    def close(self) -> None:
+        pass
+
+
+def device(*cameras: Slow) -> tuple[Device, queue.Queue[Message]]:
+    inbox: queue.Queue[Message] = queue.Queue()
+    each = iter(cameras)
+    return Device(lambda: next(each), inbox.put), inbox
+
+
+def reply(inbox: queue.Queue[Message]) -> Reply:
+    value = inbox.get(timeout=WAIT_S).value
+    assert isinstance(value, Reply)
+    return value
+
+
+def test_a_stop_overtakes_what_waits_and_starts_that_wait_are_dropped() -> None:
+    control, pictures = Slow(), Slow()
+    sender, inbox = device(control, pictures)
+    sender.submit(Status(), 1)
+    assert isinstance(control.entered.get(timeout=WAIT_S), Status)
+    sender.submit(Status(), 2)
+    sender.submit(Start(Direction.LEFT), 3)
+    sender.submit(Stop(), 4)
+    dropped = reply(inbox)
+    assert (dropped.ticket, type(dropped.error)) == (3, Refused)
+    control.leave.set()
+    assert [reply(inbox).ticket for _ in range(3)] == [1, 4, 2]
+    sender.close()
+    assert not any(isinstance(request, Start) for request in control.got)
+
+
+def test_a_picture_that_takes_long_does_not_delay_a_stop() -> None:
+    control, pictures = Slow(), Slow()
+    sender, inbox = device(control, pictures)
+    control.leave.set()
+    sender.submit(Snapshot(), 1)
+    assert isinstance(pictures.entered.get(timeout=WAIT_S), Snapshot)
+    sender.submit(Stop(), 2)
+    assert reply(inbox).ticket == 2
+    pictures.leave.set()
+    sender.close()
+
+
+def test_at_the_end_a_motion_is_stopped_until_that_is_confirmed() -> None:
+    control, pictures = Slow(deaf=2), Slow()
+    sender, inbox = device(control, pictures)
+    control.leave.set()
+    pictures.leave.set()
+    sender.submit(Start(Direction.LEFT), 1)
+    assert reply(inbox).error is None
+    sender.close()
+    assert not control.moving
+    assert sum(isinstance(request, Stop) for request in control.got) == 3
+    assert not sender.control.thread.is_alive()
+
+
+def test_a_camera_at_rest_is_sent_nothing_at_the_end() -> None:
+    control, pictures = Slow(), Slow()
+    sender, _ = device(control, pictures)
+    sender.close()
+    assert control.got == []

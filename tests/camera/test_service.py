@@ -1,0 +1,295 @@
+"""The camera service in virtual time: the life of orders, who wins, and the scan from order to result."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from services import payloads
+from services.bus import Message
+from services.camera.requests import Away, BadLogin, Direction, Start, Status, Stop
+from services.errors import BadMessage
+from tests.camera.flat import Flat
+from tests.camera.motors import Motors
+
+POSITIONS = "Kitchen: [41.1, 34.5, 0]\nSofa: [350.0, 40.0, 0]\nDoor: [200.0, 20.0, 0]\n"
+PRESETS = "Kitchen: 3\nSofa: 1\n"
+LIFE = ["accepted", "running", "done"]
+
+
+@pytest.fixture
+def flat(tmp_path: Path) -> Flat:
+    (tmp_path / "preset_position.yaml").write_text(POSITIONS)
+    (tmp_path / "preset_coords.yaml").write_text(PRESETS)
+    return Flat(tmp_path, places=Path()).online()
+
+
+def test_goto_is_accepted_runs_and_is_done_when_the_camera_rests_there(flat: Flat) -> None:
+    flat.order("Goto", "Kitchen")
+    flat.until(flat.ended)
+    assert flat.states() == LIFE
+    assert abs(flat.reading.pan - 41.1) <= 0.5
+    assert abs(flat.reading.tilt - 34.5) <= 0.5
+    assert flat.motors.running is None
+    assert flat.last()["position"]["place"] == "Kitchen"
+    assert flat.last()["position"]["moving"] is False
+
+
+def test_keys_and_place_names_are_matched_without_regard_to_case(flat: Flat) -> None:
+    flat.order("gOtO", "kitchen")
+    flat.until(flat.ended)
+    assert flat.last()["key"] == "Goto"
+    assert flat.states() == LIFE
+
+
+def test_the_answer_also_goes_where_the_one_who_asked_wants_it(flat: Flat) -> None:
+    flat.send("camera/ip1/order/ScanImgPub", b"ON", reply_to="answers/me", correlation=b"7")
+    answers = [message for message in flat.said if message.topic == "answers/me"]
+    assert [json.loads(message.payload)["state"] for message in answers] == LIFE
+    assert {message.correlation for message in answers} == {b"7"}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("Goto", "Garden", "no place 'Garden'; there are: Kitchen, Sofa, Door"),
+        ("Dance", "now", "no order 'Dance'"),
+        ("RTSP", "ON", "not available"),
+        ("Privacy", "ON", "not available"),
+        ("Move", "Sideways", "expected Stop"),
+        ("Move", "Left 9", "speed from 1 to 8"),
+        ("Move", "Left 3 0", "seconds from 0"),
+        ("Scan", "maybe", "expected True or False"),
+        ("Scan", {"places": ["Garden"]}, "no place 'Garden'"),
+        ("SetTarget", "five", "marker ids"),
+        ("Zoom", "9", "zoom 9 is out of range 0 to 8"),
+    ],
+)
+def test_an_order_that_cannot_be_done_is_refused_with_the_reason(
+    flat: Flat, key: str, value: object, told: str
+) -> None:
+    flat.order(key, value)
+    assert flat.states() == ["refused"]
+    assert told in flat.last()["error"]
+    assert not flat.started()
+
+
+def test_position_set_moves_and_leaves_what_is_left_out(flat: Flat) -> None:
+    flat.send("camera/ip1/position/set", b'{"pan": 60, "id": "1"}')
+    flat.until(flat.ended)
+    assert flat.last()["key"] == "Position"
+    assert flat.last()["value"] == {"pan": 60.0}
+    assert abs(flat.reading.pan - 60) <= 0.5
+    assert flat.reading.tilt == 20.0
+
+
+def test_a_goal_in_the_dead_arc_is_clamped_and_says_so(flat: Flat) -> None:
+    flat.send("camera/ip1/position/set", b'{"pan": 181, "id": "1"}')
+    flat.until(flat.ended)
+    assert flat.last()["state"] == "done"
+    assert flat.last()["clamped"] is True
+
+
+def test_a_position_out_of_range_is_refused_naming_the_range(flat: Flat) -> None:
+    flat.send("camera/ip1/position/set", b'{"tilt": 120, "id": "1"}')
+    assert flat.last()["state"] == "refused"
+    assert "-10 to 108" in flat.last()["error"]
+
+
+def test_a_move_ends_by_itself(flat: Flat) -> None:
+    flat.order("Move", "Left 3 0.5")
+    flat.until(flat.ended)
+    assert flat.states() == LIFE
+    assert flat.motors.running is None
+    assert 4 < abs(flat.reading.pan - 90) < 12
+
+
+def test_the_same_move_again_prolongs_it(flat: Flat) -> None:
+    flat.order("Move", "Left 3 1", order_id="a")
+    flat.run(0.8)
+    flat.order("Move", "Left 3 1", order_id="b")
+    flat.until(lambda: flat.ended("a") and flat.ended("b"))
+    assert (flat.states("a"), flat.states("b")) == (LIFE, LIFE)
+    assert sum(isinstance(request, Start) for request in flat.motors.sent) == 1
+    assert abs(flat.reading.pan - 90) > 8.5
+
+
+def test_stop_ends_a_move_within_a_request(flat: Flat) -> None:
+    flat.order("Goto", "Door", order_id="a")
+    flat.run(3)
+    assert flat.motors.running is not None
+    flat.order("Move", "Stop", order_id="b")
+    before = flat.now
+    flat.until(lambda: flat.motors.running is None)
+    assert flat.now - before < 1.0
+    flat.until(lambda: flat.ended("b"))
+    assert flat.states("a")[-1] == "cancelled"
+    assert flat.states("b") == LIFE
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "winner"),
+    [
+        ("human", "human", "b"),
+        ("mission", "human", "b"),
+        ("mission", "mission", "b"),
+        ("human", "mission", "a"),
+    ],
+)
+def test_the_newest_order_of_the_highest_rank_wins_and_the_loser_is_cancelled(
+    flat: Flat, first: str, second: str, winner: str
+) -> None:
+    flat.order("Goto", "Door", order_id="a", by=first)
+    flat.run(2)
+    flat.order("Goto", "Kitchen", order_id="b", by=second)
+    flat.until(lambda: flat.ended("a") and flat.ended("b"))
+    loser = "a" if winner == "b" else "b"
+    assert flat.states(winner) == LIFE
+    assert flat.states(loser)[-1] == "cancelled"
+    assert "goes first" in flat.last(loser)["error"]
+
+
+def test_everybody_wins_over_a_scan(flat: Flat) -> None:
+    flat.order("Scan", "ON", order_id="a")
+    flat.run(2)
+    flat.order("Goto", "Kitchen", order_id="b", by="mission")
+    flat.until(lambda: flat.ended("b"))
+    assert flat.states("a")[-1] == "cancelled"
+    assert flat.payloads("scan/state")[-1]["state"] == "cancelled"
+
+
+def test_a_scan_finds_the_marker_and_publishes_its_place(flat: Flat) -> None:
+    flat.markers[582] = (345.0, 38.0)
+    flat.order("Scan", "ON")
+    flat.until(flat.ended)
+    assert flat.states() == LIFE
+    result = payloads.ScanResult.model_validate(flat.payloads("scan/result")[0])
+    assert (result.marker, result.place, result.camera) == (582, "Sofa", "ip1")
+    assert result.frames == 4
+    assert flat.payloads("marker/582") == flat.payloads("scan/result")
+    states = flat.payloads("scan/state")
+    assert [states[0]["state"], states[-1]["state"]] == ["idle", "done"]
+    assert states[-1]["found"] == [582]
+    assert [one["progress"] for one in states] == sorted(one["progress"] for one in states)
+
+
+def test_a_scan_that_finds_nothing_visits_every_place_and_is_done(flat: Flat) -> None:
+    flat.order("Scan", {"targets": [17], "places": ["Sofa", "Kitchen"]})
+    flat.until(flat.ended)
+    assert flat.states() == LIFE
+    assert flat.payloads("scan/result") == []
+    assert flat.payloads("scan/state")[-1]["frames_taken"] == 8
+    assert [place for place in dict.fromkeys(one["place"] for one in flat.payloads("scan/state")) if place] == [
+        "Sofa",
+        "Kitchen",
+    ]
+
+
+def test_a_scan_that_is_switched_off_stops_the_motors_and_ends_cancelled(flat: Flat) -> None:
+    flat.order("Scan", "ON", order_id="a")
+    flat.until(lambda: flat.motors.running is not None)
+    flat.order("Scan", "OFF", order_id="b")
+    flat.until(lambda: flat.ended("a") and flat.ended("b"))
+    assert flat.motors.running is None
+    assert (flat.states("a")[-1], flat.states("b")[-1]) == ("cancelled", "done")
+    assert flat.payloads("scan/state")[-1]["state"] == "cancelled"
+
+
+def test_targets_are_set_added_and_removed(flat: Flat) -> None:
+    flat.order("SetTarget", "582,17")
+    flat.order("AddTarget", 100)
+    flat.order("RemoveTarget", "17")
+    assert flat.service.scanner.targets == (582, 100)
+
+
+def test_save_as_keeps_where_the_camera_looks_and_remove_forgets_it(flat: Flat, tmp_path: Path) -> None:
+    flat.order("SaveAs", "Fenêtre: 2", order_id="a")
+    flat.until(lambda: flat.ended("a"))
+    assert flat.states("a") == LIFE
+    flat.run(2)
+    assert flat.payloads("places")[-1]["Fenêtre: 2"] == {"pan": 90.0, "tilt": 20.0, "zoom": 0.0, "preset": 2}
+    flat.order("Remove", "Fenêtre: 2", order_id="b")
+    flat.until(lambda: flat.ended("b"))
+    flat.run(2)
+    assert "Fenêtre: 2" not in flat.payloads("places")[-1]
+
+
+def test_mirror_is_read_back_and_the_next_move_learns_the_new_direction(flat: Flat) -> None:
+    flat.order("Goto", "Kitchen", order_id="a")
+    flat.until(lambda: flat.ended("a"))
+    flat.order("Mirror", "OFF", order_id="b")
+    flat.until(lambda: flat.ended("b"))
+    assert flat.states("b") == LIFE
+    flat.order("Goto", "Sofa", order_id="c")
+    flat.until(lambda: flat.ended("c"))
+    assert flat.states("c") == LIFE
+
+
+def test_a_camera_that_goes_away_fails_the_move_and_is_stopped_first_when_it_is_back(flat: Flat) -> None:
+    flat.order("Goto", "Door", order_id="a")
+    flat.run(3)
+    flat.camera.away = Away("no answer from the camera")
+    flat.until(lambda: flat.ended("a"))
+    assert flat.states("a")[-1] == "failed"
+    flat.run(5)
+    assert flat.payloads("status")[-1]["state"] == "degraded"
+    flat.motors.sent.clear()
+    flat.camera.away = None
+    flat.until(lambda: bool(flat.motors.sent))
+    assert isinstance(flat.motors.sent[0], Stop)
+    flat.until(lambda: flat.payloads("status")[-1]["state"] == "online")
+    assert flat.motors.running is None
+
+
+def test_orders_are_refused_while_the_camera_is_away_and_it_is_asked_ever_less_often(flat: Flat) -> None:
+    flat.camera.away = Away("no answer from the camera")
+    flat.run(120)
+    flat.order("Goto", "Kitchen")
+    assert flat.states() == ["refused"]
+    assert "the camera is offline: no answer" in flat.last()["error"]
+    before = flat.service.counters["requests"]
+    flat.run(100)
+    assert 5 <= flat.service.counters["requests"] - before <= 12
+
+
+def test_a_wrong_password_is_tried_once_and_then_left_alone(flat: Flat) -> None:
+    flat.camera.away = BadLogin("the camera does not accept this user and password")
+    flat.run(3)
+    assert flat.payloads("status")[-1]["state"] == "bad_login"
+    before = flat.service.counters["requests"]
+    flat.run(100)
+    assert flat.service.counters["requests"] == before
+
+
+def test_an_idle_camera_is_asked_at_most_twice_a_second(flat: Flat) -> None:
+    flat.motors.sent.clear()
+    flat.run(60)
+    assert all(isinstance(request, Status) for request in flat.motors.sent)
+    assert len(flat.motors.sent) <= 120
+    assert len([one for one in flat.said if one.topic == "diagnostics/camera/ip1"]) >= 60
+
+
+def test_a_camera_that_turns_when_the_service_starts_is_stopped(tmp_path: Path) -> None:
+    motors = Motors()
+    motors.answer(Start(Direction.LEFT, 2))
+    flat = Flat(tmp_path, motors=motors, places=Path()).online()
+    assert motors.running is None
+    assert any(isinstance(request, Stop) for request in flat.motors.sent)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        Message("camera/ip1/order/Goto", b"\xff", received=1000.0),
+        Message("camera/ip1/order/Goto", b'{"value": 1, "by": "cat"}', received=1000.0),
+        Message("camera/ip1/position/set", b"{}", received=1000.0),
+        Message("camera/ip1/order/Goto", b"Kitchen", received=1000.0, retain=True),
+        Message("camera/ip1/order/Goto", b"Kitchen", received=900.0),
+    ],
+)
+def test_what_is_not_an_order_is_told_to_the_runner(tmp_path: Path, message: Message) -> None:
+    flat = Flat(tmp_path, places=Path())
+    with pytest.raises(BadMessage):
+        list(flat.service.handle(message, 1000.0))

@@ -1,0 +1,91 @@
+"""Who may do what at the broker, shown on a real mosquitto, and the generated files."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from services import access, topics
+from services.bus import Message
+from services.bus.connection import Address
+from services.bus.mqtt import MqttBus
+from services.client import Client
+from services.peers import mosquitto, program
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_written_files_equal_what_the_code_generates() -> None:
+    assert (ROOT / "bus_topics.md").read_text(encoding="utf-8") == topics.markdown()
+    assert (ROOT / "mosquitto/acl").read_text(encoding="utf-8") == access.acl(["ip1"])
+
+
+def test_every_role_of_the_table_has_an_account() -> None:
+    known = {*access.accounts(["ip1"]), "camera-<cam>", "<service>"}
+    for row in topics.TABLE:
+        assert {*row.writers, *row.readers} <= known, row.pattern
+
+
+@pytest.mark.mosquitto
+def test_our_password_lines_are_those_of_mosquitto_passwd(tmp_path: Path) -> None:
+    tool = program("mosquitto_passwd", "mosquitto")
+    plain = tmp_path / "theirs"
+    plain.write_text("bridge:invented\n")
+    subprocess.run([tool, "-U", str(plain)], check=True, timeout=30)
+    theirs, ours = plain.read_text().split("$"), access.password_line("bridge", "invented").split("$")
+    assert ours[:3] == theirs[:3]
+    assert [len(part) for part in ours] == [len(part.rstrip("\n")) for part in theirs]
+
+
+@pytest.mark.mosquitto
+def test_a_service_can_say_what_is_its_own_and_nothing_else(tmp_path: Path) -> None:
+    said = {
+        "camera-ip1": ("camera/ip1/scan/result", "camera/ip2/scan/result", "home/Lamp/state", "service/bridge/status"),
+        "bridge": ("home/Lamp/command", "home/Lamp/state", "camera/ip1/scan/result", "service/bridge/info"),
+        "openhab": ("home/Lamp/state", "home/Lamp/command", "camera/ip1/position"),
+    }
+    allowed = {"camera/ip1/scan/result", "home/Lamp/command", "service/bridge/info", "home/Lamp/state"}
+    with mosquitto.private(tmp_path, cameras=["ip1", "ip2"]) as broker:
+        ear = _client(broker, "operator")
+        ear.subscribe("camera/#", "home/#", "service/bridge/#")
+        for account, texts in said.items():
+            mouth = _client(broker, account)
+            for topic in texts:
+                mouth.say(topic, f"{account} {topic}")
+            mouth.say("service/" + account + "/status", "done")
+            mouth.bus.close()
+        ear.say("home/Lamp/command", "last")
+        ear.until(lambda m: m.payload == b"last")
+        heard = {m.payload.decode() for m in ear.seen}
+        ear.bus.close()
+    assert "openhab home/Lamp/state" in heard
+    assert "bridge home/Lamp/command" in heard
+    assert "camera-ip1 camera/ip1/scan/result" in heard
+    for text in heard:
+        account, _, topic = text.partition(" ")
+        assert not topic or topic in allowed, text
+        assert (account, topic) not in {("bridge", "home/Lamp/state"), ("openhab", "home/Lamp/command")}
+
+
+@pytest.mark.mosquitto
+def test_who_has_no_account_is_refused(tmp_path: Path) -> None:
+    with mosquitto.private(tmp_path) as broker:
+        stranger = MqttBus(Address("stranger", port=broker.port))
+        end = time.monotonic() + 1.0
+        while time.monotonic() < end:
+            stranger.publish(Message("home/Lamp/command", b"ON"))
+            stranger.receive(0.05)
+            assert not stranger.connected
+        stranger.close()
+
+
+def _client(broker: mosquitto.Broker, account: str) -> Client:
+    bus = MqttBus(Address(f"{account}-test", port=broker.port, user=account, password=broker.passwords[account]))
+    end = time.monotonic() + 5.0
+    while not bus.connected:
+        assert time.monotonic() < end, f"{account} is not let in"
+        bus.receive(0.02)
+    return Client(bus)

@@ -1,0 +1,131 @@
+"""The configuration: every fault at once, with file and line; secrets from where they belong."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from services import secret_store
+from services.config import load
+from services.document import dotted, read, write
+from services.errors import ConfigError
+
+CONFIG = Path(__file__).parents[1] / "config"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A copy of the example configuration, to be spoilt."""
+    return Path(shutil.copytree(CONFIG, tmp_path / "config"))
+
+
+def spoil(file: Path, old: str, new: str) -> int:
+    """Replaces a text that stands once; the line it stood in."""
+    text = file.read_text(encoding="utf-8")
+    assert text.count(old) == 1, f"{old!r} stands {text.count(old)} times"
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    return text[: text.index(old)].count("\n") + 1
+
+
+def faults(file: Path) -> list[str]:
+    with pytest.raises(ConfigError) as caught:
+        load(file)
+    return list(caught.value.faults)
+
+
+def test_the_simulated_apartment_needs_nothing_from_outside() -> None:
+    apartment = load(CONFIG / "simulated.yaml")
+    assert apartment.cameras == ("ip1",)
+    assert {"camera-ip1", "bridge", "persistence", "simulated-home", "simulated-camera"} <= set(apartment.instances)
+
+
+def test_the_example_is_good_once_its_secrets_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    missing = faults(CONFIG / "apartment.yaml")
+    assert len(missing) == 6
+    assert all("expected ${" in fault and "got nothing" in fault for fault in missing)
+    for fault in missing:
+        monkeypatch.setenv(fault.split("${")[1].split("}")[0], "invented")
+    apartment = load(CONFIG / "apartment.yaml")
+    assert "invented" not in repr(apartment)
+
+
+def test_six_faults_of_six_kinds_are_all_told_with_file_and_line(folder: Path) -> None:
+    file, home = folder / "simulated.yaml", folder / "home.yaml"
+    lines = [
+        spoil(file, "    user: ros\n    password: ${CAMERA_IP1_PASSWORD:-only-simulated}\n    camera_info", "    usr: ros\n    password: x\n    camera_info"),
+        spoil(file, "  port: ${APARTMENT_BROKER_PORT:-1883}", "  port: many"),
+        spoil(file, "    tilt_range: [-10, 108]", "    tilt_range: [-10]"),
+        spoil(file, "default_camera: ip1", "default_camera: ip7"),
+        spoil(file, "  rules: bridge.yaml", "  rules: ${NOT_ANYWHERE}"),
+        spoil(home, "  Kitchen_Light:", "  Kitchen-Light:"),
+    ]  # fmt: skip
+    told = faults(file)
+    places = [f"{file}:{line}: " for line in lines[:5]] + [f"{home}:{lines[5]}: "]
+    for place in places:
+        assert any(fault.startswith(place) for fault in told), f"{place} not in {told}"
+    by_place = {place: next(fault for fault in told if fault.startswith(place)) for place in places}
+    assert "did you mean 'user'?" in by_place[places[0]]
+    assert "bus.port: expected a valid integer" in by_place[places[1]]
+    assert "cameras.ip1.tilt_range" in by_place[places[2]]
+    assert "default_camera: expected one of the cameras (ip1), got 'ip7'" in by_place[places[3]]
+    assert "expected ${NOT_ANYWHERE} in the environment" in by_place[places[4]]
+    assert "items.Kitchen-Light: expected a name of letters, digits and _" in by_place[places[5]]
+
+
+def test_check_lists_every_fault_and_ends_with_two(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    spoil(file, "  port: ${APARTMENT_BROKER_PORT:-1883}", "  port: 99999")
+    spoil(file, "default_camera: ip1", "default_camera: ip7")
+    done = subprocess.run(
+        [sys.executable, "-m", "services", "check", "--config", str(file)], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 2
+    assert all(line.startswith(f"{file}:") for line in done.stderr.splitlines())
+
+
+def test_a_password_never_stands_in_a_fault(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    spoil(file, "  url: ${APARTMENT_DATABASE:-sqlite:////tmp/apartment-simulated/bus.db}\n  password: ${APARTMENT_DATABASE_PASSWORD:-}",
+          "  url: 7\n  password: [very-secret]")  # fmt: skip
+    assert "very-secret" not in "\n".join(faults(file))
+
+
+def test_only_the_services_that_run_here_need_their_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BUS_BRIDGE_PASSWORD", "invented")
+    assert "bridge" in load(CONFIG / "apartment.yaml", only=("bridge",)).instances
+
+
+def test_a_document_knows_its_lines_and_tells_what_is_wrong_with_it(tmp_path: Path) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text("a:\n  b: [1, 2]\n  ON: off\nc: 1\nc: 2\n")
+    document = read(file)
+    assert document.value == {"a": {"b": [1, 2], "ON": "off"}, "c": 1}
+    assert document.where(("a", "b", 1)) == f"{file}:2"
+    assert document.faults == [f"{file}:1: file: expected every key once, got 'c' again in line 5"]
+    file.write_text("a: [1,\nb: 2")
+    assert read(file).faults[0].startswith(f"{file}:2: file: expected YAML, got ")
+    assert "expected a readable file" in read(tmp_path / "nowhere.yaml").faults[0]
+    assert dotted(("cameras", "hall", "presets", 1)) == "cameras.hall.presets[1]"
+
+
+def test_writing_comes_back_as_it_was(tmp_path: Path) -> None:
+    places = {"Living room": [41.1, 34.5, 0], "Küche": [0.0, 1.5, 2]}
+    write(tmp_path / "p.yaml", places)
+    assert read(tmp_path / "p.yaml").value == places
+    assert [file.name for file in tmp_path.iterdir()] == ["p.yaml"]
+
+
+def test_secrets_come_from_environment_then_credential_then_file(tmp_path: Path) -> None:
+    (tmp_path / "secrets.yaml").write_text("A: file\nB: file\nC: file\n")
+    (tmp_path / "credentials").mkdir()
+    for name in ("A", "B"):
+        (tmp_path / "credentials" / name).write_text("credential\n")
+    environment = {"A": "environment", "CREDENTIALS_DIRECTORY": str(tmp_path / "credentials"),
+                   "APARTMENT_SECRETS": str(tmp_path / "secrets.yaml")}  # fmt: skip
+    find = secret_store.lookup(environment)
+    assert [find(name) for name in "ABCD"] == ["environment", "credential", "file", None]

@@ -1,0 +1,328 @@
+"""The whole apartment on real parts: mosquitto, MariaDB, ROS, one process per service; met only from outside.
+
+What is done to it here is what people and accidents do: public clients, kill -9, a broker restart, and rubbish.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from services import peers, persistence, topics
+from services.client import Client, connected
+from services.config import BusSettings
+from services.simulated import Parts, Simulated, parts_of, services_of, start_mosquitto
+from services.simulators.world import load as load_world
+from services.storage import open_storage
+from services.supervisor import Supervisor, in_background
+
+pytestmark = [pytest.mark.mosquitto, pytest.mark.mariadb, pytest.mark.ros]
+TARGET = 582
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Parts]:
+    with parts_of(tmp_path_factory.mktemp("parts"), real=True) as parts:
+        missing = [text for _, _, text in parts.used if text]
+        if missing:
+            pytest.skip("; ".join(missing))
+        yield parts
+
+
+@pytest.fixture(scope="module")
+def flat(parts: Parts, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Simulated]:
+    with services_of(tmp_path_factory.mktemp("flat"), parts) as running:
+        yield running
+
+
+@pytest.fixture
+def bus(flat: Simulated) -> Iterator[Client]:
+    with connected(flat.apartment.bus, ["#"]) as client:
+        yield client
+
+
+@pytest.fixture
+def shell(parts: Parts) -> Iterator[Shell]:
+    made = Shell(parts)
+    yield made
+    made.close()
+
+
+class Shell:
+    """A person with the public clients."""
+
+    def __init__(self, parts: Parts) -> None:
+        self.parts = parts
+        assert parts.ros is not None
+        self.environment = {**os.environ, **parts.ros.env, "PYTHONUNBUFFERED": "1"}
+        self.listening: list[subprocess.Popen[str]] = []
+
+    def mosquitto_pub(self, *arguments: str) -> None:
+        self._run(peers.program("mosquitto_pub", "mosquitto-clients"), "-p", str(self.parts.broker_port), *arguments)
+
+    def rostopic_pub(self, topic: str, kind: str, yaml: str) -> None:
+        self._run(peers.program("rostopic", "python3-rostopic"), "pub", "-1", topic, kind, yaml)
+
+    def rostopic_echo(self, topic: str) -> Heard:
+        return self._listen(peers.program("rostopic", "python3-rostopic"), "echo", topic)
+
+    def mosquitto_sub(self, *arguments: str) -> Heard:
+        command = peers.program("mosquitto_sub", "mosquitto-clients")
+        return self._listen(command, "-p", str(self.parts.broker_port), "-v", *arguments)
+
+    def sql(self, query: str) -> str:
+        """What `mariadb` prints for the reader's account; the password goes by the environment."""
+        server = self.parts.database
+        assert server is not None
+        environment = {**os.environ, "MYSQL_PWD": server.reader_password}
+        command = [
+            peers.program("mariadb", "mariadb-client"),
+            "-h",
+            server.host,
+            "-P",
+            str(server.port),
+            "-u",
+            server.reader,
+        ]
+        done = subprocess.run([*command, "-N", "-B", "-e", query, server.view_database], env=environment, timeout=30,
+                              capture_output=True, text=True, check=True)  # fmt: skip
+        return done.stdout.strip()
+
+    def close(self) -> None:
+        for process in self.listening:
+            peers.end(process)  # type: ignore[arg-type]
+            assert process.stdout is not None
+            process.stdout.close()
+
+    def _run(self, *command: str) -> None:
+        subprocess.run(command, env=self.environment, check=True, timeout=60, capture_output=True)
+
+    def _listen(self, *command: str) -> Heard:
+        process = subprocess.Popen(
+            command, env=self.environment, stdout=subprocess.PIPE, text=True, start_new_session=True
+        )
+        self.listening.append(process)
+        return Heard(process)
+
+
+class Heard:
+    """The growing output of a listening client."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        assert process.stdout is not None
+        os.set_blocking(process.stdout.fileno(), False)
+        self.stdout, self.text = process.stdout, ""
+
+    def until(self, pattern: str, timeout_s: float = 20.0) -> re.Match[str]:
+        """Waits until the output matches; what came until then is in the failure."""
+        end = time.monotonic() + timeout_s
+        while not (found := re.search(pattern, self.text)):
+            assert time.monotonic() < end, f"no {pattern!r} within {timeout_s} s in:\n{self.text[-3000:]}"
+            peers.wait_until(self._more, f"output like {pattern!r}; so far:\n{self.text[-3000:]}", timeout_s)
+        return found
+
+    def _more(self) -> bool:
+        chunk = self.stdout.read()
+        self.text += chunk or ""
+        return bool(chunk)
+
+
+def eventually(what: Callable[[], Any], timeout_s: float = 15.0) -> Any:
+    found: list[Any] = []
+
+    def ready() -> bool:
+        found[:] = [what()]
+        return bool(found[0])
+
+    peers.wait_until(ready, "what was expected", timeout_s)
+    return found[0]
+
+
+def test_a_home_state_reaches_the_robot_and_the_database(flat: Simulated, shell: Shell) -> None:
+    robot = shell.rostopic_echo("/iot_updates")
+    robot.until(r'key: "?ROS_Status')  # the snapshot that every new subscriber gets
+    shell.mosquitto_pub("-t", "home/Kitchen_Light/state", "-m", "OFF", "-r")
+    robot.until(r'key: "Kitchen_Light"\nvalue: "OFF"')
+    shell.mosquitto_pub("-t", "home/Kitchen_Light/state", "-m", "ON", "-r")
+    robot.until(r'key: "Kitchen_Light"\nvalue: "OFF"(.|\n)*key: "Kitchen_Light"\nvalue: "ON"')
+    number = eventually(lambda: shell.sql("SELECT ItemId FROM Items WHERE ItemName='Kitchen_Light'"))
+    eventually(lambda: shell.sql(f"SELECT Value FROM Item{number} ORDER BY Time DESC LIMIT 2").split() == ["ON", "OFF"])
+
+
+def test_a_command_of_the_robot_is_carried_out_by_the_home(flat: Simulated, shell: Shell, bus: Client) -> None:
+    bus.say("home/Kitchen_Light/command", "ON")
+    bus.payload("home/Kitchen_Light/state", lambda text: text == "ON")
+    house = shell.mosquitto_sub("-t", "home/Kitchen_Light/#")
+    house.until(r"home/Kitchen_Light/state ON")
+    shell.rostopic_pub("/iot_command", "diagnostic_msgs/KeyValue", '{key: "Kitchen_Light", value: "OFF"}')
+    house.until(r"home/Kitchen_Light/command OFF\n(.|\n)*home/Kitchen_Light/state OFF")
+
+
+def test_a_scan_finds_the_marker_where_it_really_is_and_everyone_learns_it(flat: Simulated, shell: Shell) -> None:
+    truth = next(marker for marker in load_world(flat.config.with_name("world.yaml")).markers if marker.id == TARGET)
+    place, point = (
+        shell.rostopic_echo("/ip_camera_scan/result/place"),
+        shell.rostopic_echo("/ip_camera_scan/result/position"),
+    )
+    house = shell.mosquitto_sub("-t", "camera/ip1/scan/#", "-t", "camera/ip1/order_result", "-t", "camera/ip1/status")
+    house.until(r'camera/ip1/status \{"state":"online"')
+    shell.mosquitto_pub("-t", "camera/ip1/order/Scan", "-m", "ON")
+    result = json.loads(house.until(r"camera/ip1/scan/result (\{.*\})", 180.0)[1])
+    assert (result["marker"], result["place"], result["frame"]) == (TARGET, truth.place, "apartment")
+    found = [result["position"][axis] for axis in "xyz"]
+    assert math.dist(found, truth.position) <= 0.10
+    house.until(r'"key":"Scan".*"state":"done"', 60.0)
+    place.until(rf'key: "{TARGET}"\nvalue: "{truth.place}"')
+    said = point.until(r"x: (\S+)\ny: (\S+)\nz: (\S+)")
+    assert [float(number) for number in said.groups()] == pytest.approx(found, abs=1e-6)
+    row = eventually(lambda: _sighting(flat, result["scan"]))
+    assert (row.marker, row.place) == (TARGET, truth.place)
+    assert [row.x, row.y, row.z] == pytest.approx(found, abs=1e-6)
+
+
+def _sighting(flat: Simulated, scan: str) -> Any:
+    config = flat.apartment.instances["persistence"].config
+    assert isinstance(config, persistence.Config)
+    with closing(open_storage(config.address)) as storage:
+        return next((row for row in storage.sightings(TARGET, limit=10) if row.scan == scan), None)
+
+
+BUS_SERVICES = ("camera-ip1", "bridge", "persistence", "simulated-home")
+
+
+@pytest.mark.parametrize("name", BUS_SERVICES)
+def test_a_killed_service_is_back_within_three_seconds_and_nobody_else_notices(
+    flat: Simulated, bus: Client, name: str
+) -> None:
+    child = flat.supervisor.children[name]
+    others = {one: flat.supervisor.children[one].process.pid for one in flat.supervisor.children if one != name}  # type: ignore[union-attr]
+    eventually(lambda: child.process is not None and child.ready is not None)
+    bus.payload(f"service/{name}/status", lambda text: text == "online")
+    bus.forget()
+    assert child.process is not None
+    os.kill(child.process.pid, signal.SIGKILL)
+    killed = time.monotonic()
+    bus.payload(f"service/{name}/status", lambda text: text == "offline", 3.0)
+    bus.payload(f"service/{name}/status", lambda text: text == "online", 3.0)
+    assert time.monotonic() - killed < 3.0
+    assert {m.topic for m in bus.seen if m.topic.endswith("/status") and m.topic.startswith("service/")} == {
+        f"service/{name}/status"
+    }
+    assert {one: flat.supervisor.children[one].process.pid for one in others} == others  # type: ignore[union-attr]
+    eventually(lambda: child.ready is not None)
+
+
+def test_after_a_restart_of_the_broker_every_service_works_again_within_two_seconds(
+    flat: Simulated, parts: Parts
+) -> None:
+    pids = {name: child.process.pid for name, child in flat.supervisor.children.items() if child.process}
+    parts.broker.close()
+    start_mosquitto(parts)
+    back = time.monotonic()
+    with connected(flat.apartment.bus, ["service/+/status", "home/Kitchen_Light/+"]) as bus:
+        for name in BUS_SERVICES:
+            bus.payload(f"service/{name}/status", lambda text: text == "online", 2.0)
+        assert time.monotonic() - back < 2.0
+        bus.say("home/Kitchen_Light/command", "OFF")
+        bus.payload("home/Kitchen_Light/state", lambda text: text == "OFF")
+        bus.say("home/Kitchen_Light/command", "ON")
+        bus.payload("home/Kitchen_Light/state", lambda text: text == "ON")
+    assert {name: child.process.pid for name, child in flat.supervisor.children.items() if child.process} == pids
+
+
+def test_ten_thousand_messages_of_rubbish_stop_nobody_and_are_counted(flat: Simulated, bus: Client) -> None:
+    pids = {name: child.process.pid for name, child in flat.supervisor.children.items() if child.process}
+    before = {name: _counters(bus, name) for name in BUS_SERVICES}
+    rng = random.Random(1)
+    for number in range(10_000):
+        bus.say(rubbish_topic(rng), rubbish(rng), qos=number % 2)
+        if number % 500 == 0:
+            bus.pump()
+            bus.seen.clear()
+    bus.say("home/Kitchen_Light/command", "ON")
+    bus.say("home/Kitchen_Light/command", "OFF")
+    bus.payload("home/Kitchen_Light/state", lambda text: text == "OFF", 60.0)
+    for name in BUS_SERVICES:
+        after = _counters(bus, name, later_than=before[name])
+        assert after["bad"] > before[name]["bad"], name
+    assert {name: child.process.pid for name, child in flat.supervisor.children.items() if child.process} == pids
+
+
+def _counters(bus: Client, name: str, later_than: dict[str, float] | None = None) -> dict[str, float]:
+    """What the service counts, from an info that is newer than all that was sent."""
+    bus.forget()
+    enough = (later_than or {}).get("received", 0) + (500 if later_than else 0)
+    info = bus.payload(f"service/{name}/info", lambda info: info.counters["received"] >= enough, 30.0)
+    return dict(info.counters)
+
+
+def rubbish_topic(rng: random.Random) -> str:
+    row = rng.choice([row for row in topics.TABLE if row.payload is not bytes])
+    levels = {"cam": rng.choice(["ip1", "ip2", "x" * 50]), "service": rng.choice(["nobody", "a-b"]), "component": "x/y",
+              "item": rng.choice(["Kitchen_Light", "Hall_Dimmer", "No_Such_Item", "Lamp_Color"]),
+              "key": rng.choice(["Goto", "Scan", "Nonsense"]), "marker": str(rng.randrange(2000))}  # fmt: skip
+    return re.sub(r"<(\w+)>", lambda m: levels[m[1]], row.pattern) + rng.choice(["", "", "", "/more", "é"])
+
+
+def rubbish(rng: random.Random) -> bytes:
+    kind = rng.randrange(8)
+    if kind == 0:
+        return rng.randbytes(rng.randrange(200))
+    if kind == 1:
+        return b"[" * rng.randrange(1, 20_000)
+    if kind == 2:
+        return b'{"value":' * 500 + b"1" + b"}" * 500
+    if kind == 3:
+        return b"x" * (300_000 if rng.random() < 0.05 else 5000)
+    if kind == 4:
+        return b"\xff\xfe" + rng.randbytes(20)
+    if kind == 5:
+        return json.dumps(
+            {"value": {"targets": [rng.choice([-1, 1e308, "x", None])]}, "id": "x" * rng.choice([3, 300])}
+        ).encode()
+    if kind == 6:
+        return b"NaN"
+    return "".join(chr(rng.randrange(1, 0x2FF)) for _ in range(30)).encode()
+
+
+def test_a_message_that_crashes_a_service_is_put_aside_and_the_service_goes_on(parts: Parts, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "tests.crashing", str(parts.broker_port), str(tmp_path)]
+    filters = ["home/Quotient/set", "service/operator/+"]
+    with (
+        in_background(Supervisor({"operator": command})),
+        connected(BusSettings(port=parts.broker_port), filters) as bus,
+    ):
+        bus.say("home/Divisor/state", "4")
+        bus.payload("home/Quotient/set", lambda text: text == "25")
+        bus.say("home/Divisor/state", "0", retain=True)  # it comes again at every start
+        bus.payload("service/operator/status", lambda text: text == "offline")
+        info = bus.payload("service/operator/info", lambda info: info.aside, 20.0)
+        assert info.counters["aside"] == 1
+        bus.say("home/Divisor/state", "8")
+        bus.payload("home/Quotient/set", lambda text: text == "12.5")
+        bus.say("home/Divisor/state", "", retain=True)
+    file = tmp_path / "operator" / "aside" / info.aside[0]
+    record = json.loads(file.read_text())
+    assert (record["topic"], record["crashes"]) == ("home/Divisor/state", 2)
+    assert "ZeroDivisionError" in record["traceback"]
+
+
+def test_sigterm_ends_every_process_within_five_seconds(parts: Parts, tmp_path: Path) -> None:
+    with services_of(tmp_path, parts) as running:
+        processes = [child.process for child in running.supervisor.children.values() if child.process]
+        started = time.monotonic()
+    assert time.monotonic() - started < 6.0
+    assert all(process.poll() is not None for process in processes)
