@@ -8,15 +8,16 @@ configuration, not here. How the world looks is in `camera/solids.py` and `camer
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import asin, atan2, degrees, hypot
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import yaml
 from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, field_validator, model_validator
 
+from services import document
+from services.document import Document, Path_
 from services.errors import ConfigError
 from services.section import Section
 from services.vision.frames import (
@@ -62,6 +63,7 @@ class Wall(Section):
 
     @property
     def length(self) -> float:
+        """Metres."""
         return hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
 
     @model_validator(mode="after")
@@ -142,6 +144,7 @@ class TrueMount(Section):
 
     @property
     def frames(self) -> Mount:
+        """The same for the kinematics."""
         return Mount(**self.model_dump())
 
 
@@ -196,6 +199,7 @@ class Pose2D(Section):
 
     @property
     def transform(self) -> Transform:
+        """The same as a motion in space."""
         return Transform(rotation_z(self.yaw_deg), np.array([self.x, self.y, 0.0]))
 
 
@@ -235,29 +239,29 @@ class World(Section):
             raise ValueError(f"expected every label once, got {', '.join(map(repr, twice))} again")
         return furniture
 
-    @model_validator(mode="after")
-    def hangs_together(self) -> World:
-        if faults := [*self._unknown_names(), *self._unreachable_places()]:
-            raise ValueError("\n".join(faults))
-        return self
+    def faults(self) -> Iterator[tuple[Path_, str]]:
+        """What does not hang together: where it stands, and what was expected."""
+        yield from self._unknown_names()
+        yield from self._unreachable_places()
 
-    def _unknown_names(self) -> Iterator[str]:
+    def _unknown_names(self) -> Iterator[tuple[Path_, str]]:
         pieces = {piece.label for piece in self.furniture}
         places = {place for camera in self.cameras.values() for place in camera.places}
         for index, piece in enumerate(self.furniture):
             if piece.room not in self.rooms:
-                yield f"furniture.{index}.room: expected one of {', '.join(self.rooms)}, got {piece.room!r}"
+                yield ("furniture", index, "room"), _one_of(self.rooms, piece.room)
         for index, marker in enumerate(self.markers):
             for field, known in (("room", set(self.rooms)), ("where", pieces), ("place", places)):
                 if (name := getattr(marker, field)) not in known:
-                    yield f"markers.{index}.{field}: expected one of {', '.join(sorted(known))}, got {name!r}"
+                    yield ("markers", index, field), _one_of(sorted(known), name)
 
-    def _unreachable_places(self) -> Iterator[str]:
+    def _unreachable_places(self) -> Iterator[tuple[Path_, str]]:
         for name, camera in self.cameras.items():
             for label, place in camera.places.items():
                 pan, tilt = camera.aim(place.looks_at)
                 if not camera.reaches(pan, tilt):
-                    yield f"cameras.{name}.places.{label}: expected readings in reach, got {pan:.1f}, {tilt:.1f}"
+                    where = ("cameras", name, "places", label, "looks_at")
+                    yield where, f"expected readings in reach, got pan {pan:.1f} and tilt {tilt:.1f}"
 
     def marker(self, marker_id: int) -> Marker:
         """The marker with this id; KeyError when there is none."""
@@ -271,19 +275,26 @@ class World(Section):
         return self.marker(marker_id).pose
 
 
+def _one_of(known: Iterable[str], got: str) -> str:
+    return f"expected one of {', '.join(known)}, got {got!r}"
+
+
 def load(path: Path) -> World:
-    """Reads a world; ConfigError lists everything that is wrong with the file."""
+    """Reads a world; ConfigError lists everything that is wrong with the file, with the line."""
+    source = document.read(path)
+    world = None if source.faults else _world(source)
+    for where, text in world.faults() if world else ():
+        source.fault(where, text)
+    if world is None or source.faults:
+        raise ConfigError(source.faults)
+    return world
+
+
+def _world(source: Document) -> World | None:
     try:
-        return World.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as fault:
-        raise ConfigError([f"{path}: {' '.join(str(fault).split())}"]) from fault
+        return World.model_validate(source.value)
     except ValidationError as fault:
-        raise ConfigError(f"{path}: {line}" for line in _lines(fault)) from fault
-
-
-def _lines(fault: ValidationError) -> Iterator[str]:
-    for error in fault.errors():
-        where = ".".join(str(part) for part in error["loc"])
-        text = error["msg"].removeprefix("Value error, ")
-        got = "" if error["type"] in ("missing", "value_error") else f", got {error['input']!r}"
-        yield from (f"{where}: {line}{got}" if where else line for line in text.splitlines())
+        for error in fault.errors():
+            got = "" if error["type"] in ("missing", "value_error") else f", got {error['input']!r}"
+            source.fault(error["loc"], error["msg"].removeprefix("Value error, ") + got)
+        return None

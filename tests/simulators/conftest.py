@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from services.simulators.camera import Config, Simulated, start
+from services.simulators.camera import Config, start
+from services.simulators.camera.program import Simulated
 from services.simulators.world import World, load
 
 CONFIG = Path(__file__).parents[2] / "config"

@@ -50,6 +50,7 @@ class Port(ThreadingHTTPServer):
     request_queue_size = 64
 
     def server_bind(self) -> None:
+        """Binds; the name is the address."""
         TCPServer.server_bind(self)
         self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
 
@@ -119,20 +120,24 @@ class Connection(BaseHTTPRequestHandler):
     server: CameraServer
 
     def setup(self) -> None:
+        """The connection was accepted."""
         super().setup()
         self.server.enter(self.connection)
 
     def finish(self) -> None:
+        """The connection is done with."""
         self.server.leave(self.connection)
         super().finish()
 
     def handle(self) -> None:
+        """One request, unless the camera is off."""
         if self.server.device.booting(self.server.clock()) or self.server.closing.is_set():
             self._reset()
         else:
             self.handle_one_request()
 
     def do_GET(self) -> None:
+        """One request, of any method."""
         self.close_connection = True
         entry = {"time": self.server.clock(), "method": self.command, "target": self.path, "status": None}
         entry["authorized"] = "Authorization" in self.headers

@@ -84,11 +84,13 @@ class Visit(BaseHTTPRequestHandler):
     server: SideDoor
 
     def do_GET(self) -> None:
+        """A view."""
         if self.path not in VIEWS:
             return self._send(404, {"error": f"expected one of {', '.join(VIEWS)}"})
         return self._send(200, VIEWS[self.path](self.server.camera))
 
     def do_POST(self) -> None:
+        """An order."""
         try:
             order = json.loads(self.rfile.read(int(self.headers.get("Content-Length", 0))) or b"{}")
             ORDERS[self.path](self.server.camera, order)

@@ -11,9 +11,10 @@ import httpx
 import numpy as np
 import pytest
 
+from services.errors import ConfigError
 from services.peers import wait_until
-from services.simulators.camera import Config, Simulated, serve, start
-from services.simulators.world import World
+from services.simulators.camera import Config, start
+from services.simulators.camera.program import Simulated
 
 ATTACH = "/cgi-bin/eventManager.cgi?action=attach&codes=[VideoMotion]&heartbeat=1"
 STATUS = "/cgi-bin/ptz.cgi?action=getStatus"
@@ -191,12 +192,15 @@ def test_control_requests_wait_their_turn(config: Config) -> None:
         assert camera.server.clock() - began >= 0.45
 
 
-def test_serve_tells_where_it_is_and_ends_when_told(config: Config, world: World) -> None:
-    stopped, where = threading.Event(), []
-    thread = threading.Thread(target=serve, args=(config, where.append, stopped))
-    thread.start()
-    wait_until(lambda: bool(where), "the camera to start", 10)
-    assert httpx.get(where[0].side_door_url + "/state").json()["pose"]["tilt"] == world.cameras["ip1"].starts_at[1]
-    stopped.set()
-    thread.join(5)
-    assert not thread.is_alive()
+def test_a_ready_line_tells_the_ports(camera: Simulated) -> None:
+    said = camera.ready()
+    assert said["url"] == f"http://127.0.0.1:{said['port']}"
+    assert httpx.get(camera.side_door_url + "/state").json()["pose"]["tilt"] == 20.0
+
+
+def test_an_unknown_camera_is_a_configuration_error(config: Config) -> None:
+    with (
+        pytest.raises(ConfigError, match="expected one of ip1, got 'ip9'"),
+        start(config.model_copy(update={"camera": "ip9"})),
+    ):
+        pass
