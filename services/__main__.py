@@ -5,6 +5,7 @@ Exit codes: 0 done, 1 the thing asked for did not happen, 2 wrong usage or confi
 
 from __future__ import annotations
 
+import logging
 import signal
 import sys
 from pathlib import Path
@@ -57,6 +58,16 @@ def serve(name: str, config: Config = CONFIG) -> None:
 def simulate(what: Annotated[str, typer.Argument(help="camera or home")], config: Config = CONFIG) -> None:
     """Run one simulator alone."""
     serve(f"simulated-{what}", config)
+
+
+@app.command(epilog="Example: apartment demo --once")
+def demo(once: Annotated[bool, typer.Option("--once", help="End by itself once the marker was found.")] = False) -> None:
+    """Run the whole apartment, simulated, and tell its story."""
+    from services import demo as story  # it brings every service's libraries
+
+    process.log_to_stderr(logging.WARNING)
+    if not story.demo(out, once=once):
+        raise typer.Exit(1)
 
 
 @app.command(epilog="Example: apartment check --config config/apartment.yaml")

@@ -78,8 +78,8 @@ def serve(apartment: Apartment, name: str, ready: Ready) -> None:
 
 def _off_bus(instance: Instance, stopping: threading.Event, ready: Ready) -> None:
     """A program of its own, such as the simulated camera: it answers by itself."""
-    with importlib.import_module(instance.row.module).start(instance.config) as addresses:
-        ready(addresses.ready())
+    with importlib.import_module(instance.row.module).start(instance.config) as program:
+        ready(dict(program.addresses))
         stopping.wait()
 
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
+import os
+import threading
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -72,6 +74,19 @@ def analyse(task: Task) -> Analysed:
     return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), found, jpeg)
 
 
+def _begin_work() -> None:
+    """In a worker process: one thread of OpenCV, and an end when the service is killed."""
+    video.one_thread()
+    threading.Thread(target=_follow_parent, daemon=True).start()
+
+
+def _follow_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
 class Inline:
     """An Analyst without processes."""
 
@@ -92,7 +107,7 @@ class Pool:
     def __init__(self, post: Post, workers: int) -> None:
         self.post = post
         self.pool = ProcessPoolExecutor(
-            workers, mp_context=multiprocessing.get_context("spawn"), initializer=video.one_thread
+            workers, mp_context=multiprocessing.get_context("spawn"), initializer=_begin_work
         )
 
     def submit(self, task: Task) -> None:

@@ -18,6 +18,7 @@ from typing import Protocol
 from services.bus import Message
 from services.camera.requests import (
     Camera,
+    Direction,
     GotoPreset,
     Rank,
     Reading,
@@ -33,7 +34,9 @@ from services.runner import Post
 
 REPLY = "/camera/reply"
 STILL_DEG = 0.15  # two readings nearer than this are the same: the resolution is 0.1 degree
-END_S = 8.0  # how long the end of the service waits until the camera stands still
+END_S = 3.5  # the end of the service waits so long for a camera to stand still; then its watchdog goes on
+
+Turning = Callable[[Direction | None], None]
 
 log = logging.getLogger(__name__)
 
@@ -61,10 +64,18 @@ class _Waiting:
 class Lane:
     """One thread, one connection, one request in flight."""
 
-    def __init__(self, name: str, camera: Camera, post: Post, clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        name: str,
+        camera: Camera,
+        post: Post,
+        clock: Callable[[], float],
+        turning: Turning = lambda direction: None,
+    ) -> None:
         self.camera = camera
         self.post = post
         self.clock = clock
+        self.turning = turning
         self.started = False  # a motion may be running
         self._waiting: list[_Waiting] = []
         self._numbers = itertools.count()
@@ -106,8 +117,8 @@ class Lane:
                 self._answer(waiting, None, error, sent)
             else:
                 self._answer(waiting, result, None, sent)
-        if self.started:
-            stand_still(self.camera, self.clock)
+        if self.started and stand_still(self.camera, self.clock):
+            self.turning(None)
         self.camera.close()
 
     def _next(self) -> _Waiting | None:
@@ -118,9 +129,12 @@ class Lane:
     def _send(self, request: Request) -> object:
         if isinstance(request, Start | GotoPreset):
             self.started = True  # before it is sent: a start whose answer is lost may have been heard
+        if isinstance(request, Start):
+            self.turning(request.direction)
         result = self.camera.send(request)
         if isinstance(request, Stop):
             self.started = False
+            self.turning(None)
         return result
 
     def _answer(self, waiting: _Waiting, result: object, error: DeviceError | None, sent: float) -> None:
@@ -129,10 +143,16 @@ class Lane:
 
 
 class Device:
-    """A Sender for a camera on the network."""
+    """A Sender for a camera on the network; `turning` is told what turns, before it does (`watchdog.py`)."""
 
-    def __init__(self, connect: Callable[[], Camera], post: Post, clock: Callable[[], float] = time.time) -> None:
-        self.control = Lane("camera control", connect(), post, clock)
+    def __init__(
+        self,
+        connect: Callable[[], Camera],
+        post: Post,
+        clock: Callable[[], float] = time.time,
+        turning: Turning = lambda direction: None,
+    ) -> None:
+        self.control = Lane("camera control", connect(), post, clock, turning)
         self.pictures = Lane("camera pictures", connect(), post, clock)
 
     def submit(self, request: Request, ticket: int) -> None:
@@ -148,13 +168,15 @@ class Device:
         self.pictures.thread.join(0.5)
 
 
-def stand_still(camera: Camera, clock: Callable[[], float], limit_s: float = END_S) -> bool:
+def stand_still(
+    camera: Camera, clock: Callable[[], float], limit_s: float = END_S, *, direction: Direction | None = None
+) -> bool:
     """Sends a stop until it is confirmed and two readings are equal; whether that was so within the limit."""
     end = clock() + limit_s
     every = False
     while clock() < end:
         try:
-            camera.send(Stop(every=every))
+            camera.send(Stop(every=every, direction=direction))
             readings = [camera.send(Status()) for _ in range(3)]  # the first may lag behind the motor
         except DeviceError as error:
             log.warning("the stop at the end is not confirmed yet: %s", error)

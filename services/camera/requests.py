@@ -73,9 +73,10 @@ class Start:
 
 @dataclass(frozen=True)
 class Stop:
-    """End all motion. `every`: whatever may be running, also what somebody else started."""
+    """End all motion. `every`: whatever may be running, also what somebody else started; `direction`: this one."""
 
     every: bool = False
+    direction: Direction | None = None
     rank = Rank.STOP
 
 

@@ -17,11 +17,13 @@ from services.camera.move import goto
 from services.camera.pace import Skill
 from services.camera.plan import Plan, ask, attempt, wait
 from services.camera.requests import Away, Reading, Snapshot
-from services.camera.sightings import Sighting
+from services.camera.sightings import Sighting, between
 from services.payloads import Place, ScanState
+from services.vision.frames import Kind
 
 ANALYSE_S = 30.0  # longest wait for the last frames to be looked at
 WELL = 2  # frames that must show a target before a scan may end early
+NEARER_DEG = 3.0  # a place that looks less nearer than this is not worth the way
 TRIES = 3  # of a picture: the camera sometimes closes without an answer
 PERMUTED = 7  # up to this many places the shortest order is found by trying all
 TILT_COST = 1.7  # tilt turns slower than pan: a degree of it counts as so many
@@ -53,24 +55,25 @@ class Scan:
     frames: int = 4
     settle_s: float = 0.6
     stop_early: bool = True
+    kind: Kind = "ceiling"
     move_timeout_s: float = 60.0
     place: str | None = None
-    visited: int = 0
     taken: list[Frame] = field(default_factory=list)
     analysed: int = 0
     seen: dict[int, list[Sighting]] = field(default_factory=dict)
 
     def plan(self, look: Look) -> Plan[None]:
-        """Visits the places; `look` is handed every frame. Ends when all frames have been looked at."""
-        now = self.began
-        for name, place in self.routine.items():
-            self.place = name
-            now = yield from self._visit(place, now, look)
-            self.visited += 1
+        """Visits the places; `look` is handed every frame. Ends when all frames have been looked at.
+
+        With `stop_early`, places that can add nothing any more are left out.
+        """
+        now, left = self.began, dict(self.routine)
+        while left:
+            self.place = next(iter(left))
+            now = yield from self._visit(left.pop(self.place), now, look)
             if self.stop_early:
                 now = yield from self._all_analysed(now)
-                if self.satisfied:
-                    break
+                left = {name: place for name, place in left.items() if self.worth(place)}
         yield from self._all_analysed(now)
         self.place = None
 
@@ -83,11 +86,19 @@ class Scan:
                 sighting = Sighting(detection, frame.place, frame.reading, frame.at, analysed.size)
                 self.seen.setdefault(detection.marker, []).append(sighting)
 
-    @property
-    def satisfied(self) -> bool:
-        """Whether every target was seen well."""
+    def worth(self, place: Place) -> bool:
+        """Whether a place is still to be visited: a target is missing, or it looks nearer to one than any so far."""
         enough = min(WELL, self.frames)
-        return all(len(self.seen.get(target, ())) >= enough for target in self.targets)
+        return any(
+            len(self.seen.get(target, ())) < enough or self._nearer(place, self.seen[target]) for target in self.targets
+        )
+
+    def _nearer(self, place: Place, seen: list[Sighting]) -> bool:
+        best = min(seen, key=lambda sighting: sighting.off_centre)
+        there = best.bearing(self.kind)
+        return between(there, (place.pan, place.tilt)) + NEARER_DEG < between(
+            there, (best.reading.pan, best.reading.tilt)
+        )
 
     def state(
         self, state: Literal["running", "done", "cancelled", "failed"], now: float, reason: str = ""

@@ -72,6 +72,7 @@ class Scanner:
             settle_s=self.config.settle_s,
             stop_early=self.config.stop_early,
             move_timeout_s=self.config.move_timeout_s,
+            kind=self.kind,
         )
         self._looking = self.analyst()
         return self._run(self.scan)

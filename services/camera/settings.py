@@ -72,7 +72,7 @@ class Config(Section):
     routine: tuple[str, ...] | None = None  # places that a scan visits, in order; None: all, on the shortest way
     frames: int = Field(default=4, ge=1, le=50)  # at each place of a scan
     settle_s: float = Field(default=0.6, ge=0, le=10)  # from rest to the first frame: the picture's own delay
-    stop_early: bool = True  # a scan ends when every target was seen well
+    stop_early: bool = True  # a scan ends when every target was seen where it shows best
     move_timeout_s: float = Field(default=60.0, gt=1, le=600)
     workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
 

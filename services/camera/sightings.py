@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot
+from math import acos, atan2, cos, degrees, hypot, radians, sin
 
 import numpy as np
 
 from services.camera.requests import Reading
 from services.payloads import Point, Quaternion, ScanResult, WeightedQuaternion, stamp
 from services.vision.detect import Detection
-from services.vision.frames import Array, Mount, camera_in_apartment, quaternion
+from services.vision.frames import Array, Kind, Mount, camera_in_apartment, quaternion
 from services.vision.lens import Lens
 from services.vision.pose import Located, View, locate
 
@@ -35,6 +35,23 @@ class Sighting:
         x, y = np.asarray(self.detection.corners, float).mean(axis=0)
         width, height = self.size
         return hypot(x - (width - 1) / 2, y - (height - 1) / 2) / width
+
+    def bearing(self, kind: Kind) -> tuple[float, float]:
+        """Roughly the pan and tilt readings that would bring it to the middle of the picture (90 degrees wide)."""
+        x, y = np.asarray(self.detection.corners, float).mean(axis=0)
+        width, height = self.size
+        sign = 1.0 if kind == "ceiling" else -1.0  # which way the readings grow, in the upright picture
+        right, down = sign * (x - width / 2) / (width / 2), sign * (y - height / 2) / (width / 2)
+        tilt = radians(self.reading.tilt)
+        ahead, below = cos(tilt) - down * sin(tilt), sin(tilt) + down * cos(tilt)
+        return self.reading.pan + degrees(atan2(right, ahead)), degrees(atan2(below, hypot(right, ahead)))
+
+
+def between(one: tuple[float, float], other: tuple[float, float]) -> float:
+    """The angle between two directions given as pan and tilt, degrees."""
+    (pan, tilt), (pan_2, tilt_2) = (tuple(map(radians, pair)) for pair in (one, other))
+    cosine = sin(tilt) * sin(tilt_2) + cos(tilt) * cos(tilt_2) * cos(pan - pan_2)
+    return degrees(acos(max(-1.0, min(1.0, cosine))))
 
 
 @dataclass(frozen=True)

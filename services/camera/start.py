@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import cast
 
 from services import document
 from services.camera.address import Address
 from services.camera.analysis import Pool
 from services.camera.device import Device
-from services.camera.requests import Camera
 from services.camera.service import CameraService
 from services.camera.settings import Config
 from services.camera.sightings import Eye
+from services.camera.watchdog import Watchdog, connector
 from services.errors import ConfigError
 from services.runner import Post
 from services.vision.lens import Lens
@@ -24,11 +22,9 @@ from services.vision.lens import Lens
 def start(config: Config, post: Post) -> Iterator[CameraService]:
     """The service, with its threads to the camera; at the end a stop is sent and confirmed."""
     address = Address(config.url, config.user, config.password, config.rtsp_port, config.channel)
-    connect = cast(
-        Callable[[Address], Camera], importlib.import_module(f"services.camera.brands.{config.brand}").connect
-    )
     view = eye(config)
-    device = Device(lambda: connect(address), post)
+    watchdog = Watchdog(config.brand, address)
+    device = Device(connector(config.brand, address), post, turning=watchdog.tell)
     try:
         service = CameraService(config, device, lambda: Pool(post, config.workers), view)
         try:
@@ -37,6 +33,7 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
             service.close()
     finally:
         device.close()
+        watchdog.close()
 
 
 def eye(config: Config) -> Eye:

@@ -1,4 +1,4 @@
-"""Pictures: decoding, setting upright, drawing, and the newest frame of a camera's stream in one slot.
+"""Pictures: decoding, setting upright, drawing markers, encoding.
 
 Not here: finding markers (`vision/`), asking for a snapshot (`brands/`).
 """

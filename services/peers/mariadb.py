@@ -122,6 +122,7 @@ def _install(command: str, data: Path) -> None:
     done = subprocess.run(
         [
             command, "--no-defaults", f"--datadir={data}", *user, *SMALL, "--skip-test-db", "--skip-name-resolve",
+            f"--tmpdir={data.parent}",  # a server that starts deletes what others have in a shared one
             "--auth-root-authentication-method=socket", f"--auth-root-socket-user={getpass.getuser()}",
         ],
         capture_output=True, text=True, check=False,

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from services.vision.detect import Detection
 
 from services.bus import Message
 from services.camera.analysis import ANALYSED, Analysed, Task
@@ -33,6 +32,7 @@ from services.camera.service import CameraService
 from services.camera.settings import Config
 from services.camera.sightings import Eye
 from services.errors import DeviceError
+from services.vision.detect import Detection
 from services.vision.frames import Mount
 from services.vision.lens import Lens
 from tests.camera.motors import Motors

@@ -236,7 +236,8 @@ class Amcrest:
     def _stop(self, request: Stop) -> object:
         channel = self._known_channel()
         refused: list[Refused] = []
-        directions = [self.running] if self.running is not None and not request.every else list(Direction)
+        known = request.direction or self.running
+        directions = [known] if known is not None and not request.every else list(Direction)
         for direction in directions:
             try:
                 self._command(stop(direction, channel))

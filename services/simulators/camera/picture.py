@@ -17,7 +17,7 @@ from services.simulators.camera.motors import Pose, magnification
 from services.simulators.camera.optics import Window, project, window
 from services.simulators.camera.prints import Image
 from services.simulators.camera.scene import Scene
-from services.simulators.world import WorldCamera
+from services.simulators.true_camera import WorldCamera
 from services.vision.frames import Array
 
 Stream = Literal["MainFormat", "ExtraFormat"]

@@ -35,13 +35,14 @@ class Simulated:
     server: CameraServer
 
     @property
+    def addresses(self) -> dict[str, str | int]:
+        """What a program that attaches wants to know."""
+        return {"url": self.url, "port": self.port, "side_door_port": self.side_door_port}
+
+    @property
     def side_door_url(self) -> str:
         """Where the tests' way in is."""
         return f"http://127.0.0.1:{self.side_door_port}"
-
-    def ready(self) -> dict[str, object]:
-        """What the READY line says."""
-        return {"url": self.url, "port": self.port, "side_door_port": self.side_door_port, "rtsp_port": self.rtsp_port}
 
 
 @contextmanager

@@ -20,7 +20,8 @@ from services.simulators.camera.order import Indexes, Order
 from services.simulators.camera.prints import Image, View
 from services.simulators.camera.solids import SIDES, boxes
 from services.simulators.camera.textures import floor, generator, texture
-from services.simulators.world import Lens, World
+from services.simulators.true_camera import Lens
+from services.simulators.world import World
 from services.vision.frames import Array, Transform
 
 NEAR_M = 0.05  # nothing nearer to the lens is drawn

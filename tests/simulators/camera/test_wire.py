@@ -193,7 +193,7 @@ def test_control_requests_wait_their_turn(config: Config) -> None:
 
 
 def test_a_ready_line_tells_the_ports(camera: Simulated) -> None:
-    said = camera.ready()
+    said = camera.addresses
     assert said["url"] == f"http://127.0.0.1:{said['port']}"
     assert httpx.get(camera.side_door_url + "/state").json()["pose"]["tilt"] == 20.0
 

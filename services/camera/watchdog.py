@@ -1,0 +1,108 @@
+"""A small process beside each camera service that stops the camera when the service dies in the middle of a motion.
+
+The service tells it through a pipe what turns. When the pipe closes, by an orderly end or by kill -9, and something
+still turned, it sends the stop. It ignores the signals that end the service: it has to outlive it by a second.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import logging
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from typing import cast
+
+from pydantic import SecretStr
+
+from services.camera.address import Address
+from services.camera.device import stand_still
+from services.camera.requests import Camera, Direction, Status
+from services.errors import DeviceError
+
+STILL = "-"
+END_S = 0.5  # the service waits so long for the end of its watchdog, which may still have something to stop
+STOP_S = 60.0  # the watchdog tries to stop a camera for so long
+COMMAND = "from services.camera.watchdog import main; main()"
+
+log = logging.getLogger(__name__)
+
+
+class Watchdog:
+    """The service's end of the pipe."""
+
+    def __init__(self, brand: str, address: Address) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", COMMAND], stdin=subprocess.PIPE, text=True, start_new_session=True
+        )
+        content = {**vars(address), "password": address.password.get_secret_value()}
+        self._write(json.dumps({"brand": brand, "address": content}))
+
+    def tell(self, direction: Direction | None) -> None:
+        """What turns from now on; None: nothing."""
+        self._write(STILL if direction is None else direction.name)
+
+    def close(self) -> None:
+        """Lets it see the end of the pipe."""
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.close()
+            self.process.wait(END_S)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            log.warning("the watchdog is still at work: %s", error)
+
+    def _write(self, line: str) -> None:
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(f"{line}\n")
+            self.process.stdin.flush()
+        except OSError as error:
+            log.error("the watchdog is gone, a crash would leave the camera turning: %s", error)
+
+
+def connector(brand: str, address: Address) -> Callable[[], Camera]:
+    """Makes connections to a camera of that brand."""
+    connect = cast(Callable[[Address], Camera], importlib.import_module(f"services.camera.brands.{brand}").connect)
+    return lambda: connect(address)
+
+
+def watch(lines: Iterable[str], connect: Callable[[], Camera], clock: Callable[[], float] = time.time) -> bool:
+    """Follows what turns until the lines end, then stops that; whether there was something to stop.
+
+    At the first motion it logs in, so that the stop itself needs one request only.
+    """
+    camera: Camera | None = None
+    turning: Direction | None = None
+    for line in lines:
+        turning = None if line.strip() == STILL else Direction[line.strip()]
+        if turning is not None and camera is None:
+            camera = connect()
+            _greet(camera)
+    if camera is None:
+        return False
+    if turning is not None:
+        stand_still(camera, clock, STOP_S, direction=turning)
+    camera.close()
+    return turning is not None
+
+
+def _greet(camera: Camera) -> None:
+    try:
+        camera.send(Status())
+    except DeviceError as error:
+        log.warning("the watchdog does not reach the camera: %s", error)
+
+
+def main() -> None:
+    """The process."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    first = sys.stdin.readline()
+    if not first:
+        return
+    told = json.loads(first)
+    address = Address(**{**told["address"], "password": SecretStr(told["address"]["password"])})
+    watch(sys.stdin, connector(told["brand"], address))
