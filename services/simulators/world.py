@@ -8,30 +8,25 @@ configuration, not here. How the world looks is in `camera/solids.py` and `camer
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from math import asin, atan2, degrees, hypot
+from collections.abc import Iterable, Iterator
+from math import hypot
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import yaml
-from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, field_validator, model_validator
+from pydantic import Field, PositiveFloat, ValidationError, field_validator, model_validator
 
+from services import document
+from services.document import Document, Path_
 from services.errors import ConfigError
 from services.section import Section
+from services.simulators.true_camera import XY, XYZ, WorldCamera
 from services.vision.frames import (
     Array,
-    Kind,
-    Mount,
     Transform,
-    base_in_apartment,
-    camera_in_apartment,
     rotation_x,
     rotation_z,
 )
-
-XY = tuple[float, float]
-XYZ = tuple[float, float, float]
 
 
 class Room(Section):
@@ -62,6 +57,7 @@ class Wall(Section):
 
     @property
     def length(self) -> float:
+        """Metres."""
         return hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
 
     @model_validator(mode="after")
@@ -117,76 +113,6 @@ class Marker(Section):
         return Transform(upright @ rotation_z(self.spin_deg), np.array(self.position, float))
 
 
-class Lens(Section):
-    """The true lens of the upright picture at the widest zoom: pixels, and distortion k1 k2 p1 p2 k3 as in OpenCV."""
-
-    width: PositiveInt
-    height: PositiveInt
-    fx: PositiveFloat
-    fy: PositiveFloat
-    cx: float
-    cy: float
-    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-class TrueMount(Section):
-    """How the camera really hangs; the fields are those of `vision.frames.Mount`."""
-
-    position: XYZ
-    kind: Kind = "ceiling"
-    yaw_deg: float = 0.0
-    lean_deg: XY = (0.0, 0.0)
-    pan_to_tilt_m: XY = (0.0, 0.0)
-    tilt_to_lens_m: XY = (0.0, 0.0)
-    sensor_roll_deg: float = 0.0
-
-    @property
-    def frames(self) -> Mount:
-        return Mount(**self.model_dump())
-
-
-class Place(Section):
-    """A place as the camera remembers it: the number of its preset and the point that it looks at."""
-
-    preset: PositiveInt
-    looks_at: XYZ
-
-
-class WorldCamera(Section):
-    """A camera as it is: mount, lens, limits (degrees, as it reads them) and what it has stored."""
-
-    mount: TrueMount
-    lens: Lens
-    pan_dead_arc: XY = (179.0, 186.0)
-    tilt_range: XY = (-10.0, 108.0)
-    serial: str = "AMC0000000000001"
-    starts_at: XYZ = (0.0, 20.0, 0.0)  # pan, tilt, zoom after power-on
-    places: dict[str, Place] = Field(default_factory=dict)
-
-    def aim(self, point: XYZ) -> tuple[float, float]:
-        """The pan (0..360) and tilt readings at which the optical axis goes through a point of the apartment.
-
-        Closed form: the lens stays in the plane through the pan axis and the optical axis, so pan is the point's
-        azimuth in the base frame and tilt a right triangle in that plane.
-        """
-        mount = self.mount.frames
-        x, y, z = base_in_apartment(mount).inverse().apply(np.array(point, float))
-        forward, away = mount.pan_to_tilt_m
-        out, off = hypot(x, y) - forward, z - away
-        side = mount.tilt_to_lens_m[1] * (-1.0 if mount.kind == "ceiling" else 1.0)
-        tilt = atan2(off, out) - asin(side / hypot(out, off))
-        return degrees(atan2(y, x)) % 360.0, degrees(tilt)
-
-    def reaches(self, pan: float, tilt: float) -> bool:
-        """Whether the motors can stand at these readings."""
-        inside = self.pan_dead_arc[0] < pan % 360.0 < self.pan_dead_arc[1]
-        return not inside and self.tilt_range[0] <= tilt <= self.tilt_range[1]
-
-    def pose(self, pan: float, tilt: float) -> Transform:
-        """`T_AC` at these readings."""
-        return camera_in_apartment(self.mount.frames, pan, tilt)
-
-
 class Pose2D(Section):
     """A place and a heading on the floor."""
 
@@ -196,6 +122,7 @@ class Pose2D(Section):
 
     @property
     def transform(self) -> Transform:
+        """The same as a motion in space."""
         return Transform(rotation_z(self.yaw_deg), np.array([self.x, self.y, 0.0]))
 
 
@@ -235,29 +162,29 @@ class World(Section):
             raise ValueError(f"expected every label once, got {', '.join(map(repr, twice))} again")
         return furniture
 
-    @model_validator(mode="after")
-    def hangs_together(self) -> World:
-        if faults := [*self._unknown_names(), *self._unreachable_places()]:
-            raise ValueError("\n".join(faults))
-        return self
+    def faults(self) -> Iterator[tuple[Path_, str]]:
+        """What does not hang together: where it stands, and what was expected."""
+        yield from self._unknown_names()
+        yield from self._unreachable_places()
 
-    def _unknown_names(self) -> Iterator[str]:
+    def _unknown_names(self) -> Iterator[tuple[Path_, str]]:
         pieces = {piece.label for piece in self.furniture}
         places = {place for camera in self.cameras.values() for place in camera.places}
         for index, piece in enumerate(self.furniture):
             if piece.room not in self.rooms:
-                yield f"furniture.{index}.room: expected one of {', '.join(self.rooms)}, got {piece.room!r}"
+                yield ("furniture", index, "room"), _one_of(self.rooms, piece.room)
         for index, marker in enumerate(self.markers):
             for field, known in (("room", set(self.rooms)), ("where", pieces), ("place", places)):
                 if (name := getattr(marker, field)) not in known:
-                    yield f"markers.{index}.{field}: expected one of {', '.join(sorted(known))}, got {name!r}"
+                    yield ("markers", index, field), _one_of(sorted(known), name)
 
-    def _unreachable_places(self) -> Iterator[str]:
+    def _unreachable_places(self) -> Iterator[tuple[Path_, str]]:
         for name, camera in self.cameras.items():
             for label, place in camera.places.items():
                 pan, tilt = camera.aim(place.looks_at)
                 if not camera.reaches(pan, tilt):
-                    yield f"cameras.{name}.places.{label}: expected readings in reach, got {pan:.1f}, {tilt:.1f}"
+                    where = ("cameras", name, "places", label, "looks_at")
+                    yield where, f"expected readings in reach, got pan {pan:.1f} and tilt {tilt:.1f}"
 
     def marker(self, marker_id: int) -> Marker:
         """The marker with this id; KeyError when there is none."""
@@ -271,19 +198,26 @@ class World(Section):
         return self.marker(marker_id).pose
 
 
+def _one_of(known: Iterable[str], got: str) -> str:
+    return f"expected one of {', '.join(known)}, got {got!r}"
+
+
 def load(path: Path) -> World:
-    """Reads a world; ConfigError lists everything that is wrong with the file."""
+    """Reads a world; ConfigError lists everything that is wrong with the file, with the line."""
+    source = document.read(path)
+    world = None if source.faults else _world(source)
+    for where, text in world.faults() if world else ():
+        source.fault(where, text)
+    if world is None or source.faults:
+        raise ConfigError(source.faults)
+    return world
+
+
+def _world(source: Document) -> World | None:
     try:
-        return World.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as fault:
-        raise ConfigError([f"{path}: {' '.join(str(fault).split())}"]) from fault
+        return World.model_validate(source.value)
     except ValidationError as fault:
-        raise ConfigError(f"{path}: {line}" for line in _lines(fault)) from fault
-
-
-def _lines(fault: ValidationError) -> Iterator[str]:
-    for error in fault.errors():
-        where = ".".join(str(part) for part in error["loc"])
-        text = error["msg"].removeprefix("Value error, ")
-        got = "" if error["type"] in ("missing", "value_error") else f", got {error['input']!r}"
-        yield from (f"{where}: {line}{got}" if where else line for line in text.splitlines())
+        for error in fault.errors():
+            got = "" if error["type"] in ("missing", "value_error") else f", got {error['input']!r}"
+            source.fault(error["loc"], error["msg"].removeprefix("Value error, ") + got)
+        return None

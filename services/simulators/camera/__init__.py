@@ -1,10 +1,30 @@
 """A camera on the network, as far as a program can tell: HTTP API, motors, pictures, alarms, and its firmware's ways.
 
 Built from the facts about the API and from `world.yaml` alone: it must not import the camera service, which would
-then be tested against its own opinions. From outside in: `http` (wire) -> `digest`, `device` -> `ptz`,
-`config_tables`, `events` -> `motors`; `picture` -> `scene` -> `prints`, `solids`, `textures`, `optics`.
+then be tested against its own opinions. From outside in: `program` -> `http` (wire) -> `digest`, `device` -> `ptz`,
+`config_tables`, `events` -> `motors`; `picture` -> `scene` -> `prints`, `order`, `solids`, `textures`, `optics`.
 """
 
-from services.simulators.camera.program import Config, Simulated, serve, start
+from __future__ import annotations
 
-__all__ = ["Config", "Simulated", "serve", "start"]
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING
+
+from services.simulators.camera.settings import Config
+
+if TYPE_CHECKING:
+    from services.simulators.camera.program import Simulated
+
+__all__ = ["Config", "start"]
+
+
+def start(config: Config, *, clock: Callable[[], float] = time.time) -> AbstractContextManager[Simulated]:
+    """Runs a camera in threads of this process until the context ends. ConfigError: no such world or camera.
+
+    OpenCV is loaded here and not with the module.
+    """
+    from services.simulators.camera import program
+
+    return program.start(config, clock=clock)

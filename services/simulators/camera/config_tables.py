@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Literal
 
 from services.simulators.camera.profiles import Profile
-from services.simulators.world import Lens
+from services.simulators.true_camera import Lens
 
 Colour = Literal["colour", "auto", "bw"]
 SUB_WIDTH = 704  # the substream's; its height follows the main stream's shape

@@ -12,7 +12,7 @@ from services.simulators.camera.messages import OK, Answer, Request, lines, refu
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.profiles import Profile
 from services.simulators.camera.ptz import Ptz
-from services.simulators.world import WorldCamera
+from services.simulators.true_camera import WorldCamera
 
 Program = Callable[[Request, float], Answer]
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from random import Random
+from socketserver import TCPServer
 from threading import Event, Lock
 from typing import Any
 
@@ -42,11 +43,20 @@ class Faults:
         return self.how
 
 
-class CameraServer(ThreadingHTTPServer):
-    """One camera's port: what all its connections share."""
+class Port(ThreadingHTTPServer):
+    """A port that asks no name server for its own name, and waits for its threads when it is closed."""
 
     daemon_threads = False
     request_queue_size = 64
+
+    def server_bind(self) -> None:
+        """Binds; the name is the address."""
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
+
+
+class CameraServer(Port):
+    """One camera's port: what all its connections share."""
 
     def __init__(
         self, address: tuple[str, int], device: Device, door: Door, pictures: Pictures, clock: Callable[[], float]
@@ -110,20 +120,24 @@ class Connection(BaseHTTPRequestHandler):
     server: CameraServer
 
     def setup(self) -> None:
+        """The connection was accepted."""
         super().setup()
         self.server.enter(self.connection)
 
     def finish(self) -> None:
+        """The connection is done with."""
         self.server.leave(self.connection)
         super().finish()
 
     def handle(self) -> None:
+        """One request, unless the camera is off."""
         if self.server.device.booting(self.server.clock()) or self.server.closing.is_set():
             self._reset()
         else:
             self.handle_one_request()
 
     def do_GET(self) -> None:
+        """One request, of any method."""
         self.close_connection = True
         entry = {"time": self.server.clock(), "method": self.command, "target": self.path, "status": None}
         entry["authorized"] = "Authorization" in self.headers

@@ -29,6 +29,7 @@ class Request:
 
     @property
     def action(self) -> str:
+        """What the program is to do."""
         return self.text("action")
 
 

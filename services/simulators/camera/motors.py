@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from services.simulators.camera.profiles import Profile
-from services.simulators.world import WorldCamera
+from services.simulators.true_camera import WorldCamera
 
 ZOOM_MAX = 8.0
 MOMENT_S = 1e-3

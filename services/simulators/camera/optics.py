@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.simulators.world import Lens
+from services.simulators.true_camera import Lens
 from services.vision.frames import Array
 
 Float32 = NDArray[np.float32]

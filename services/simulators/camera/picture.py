@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from threading import Lock
 from typing import Literal
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.motors import Pose, magnification
 from services.simulators.camera.optics import Window, project, window
 from services.simulators.camera.prints import Image
 from services.simulators.camera.scene import Scene
-from services.simulators.world import WorldCamera
+from services.simulators.true_camera import WorldCamera
 from services.vision.frames import Array
 
 Stream = Literal["MainFormat", "ExtraFormat"]
@@ -46,8 +48,11 @@ class Pictures:
         self._stills: dict[Stream, Still] = {}
         self._newest: dict[Stream, tuple[object, bytes]] = {}
         self._rng = np.random.default_rng(seed)
-        size = (camera.lens.height + NOISE_PLAY, camera.lens.width + NOISE_PLAY, 3)
-        self._noise = (self._rng.standard_normal(size, dtype=np.float32) * NOISE).round().astype(np.int8)
+
+    @cached_property
+    def _noise(self) -> NDArray[np.int8]:
+        size = (self._camera.lens.height + NOISE_PLAY, self._camera.lens.width + NOISE_PLAY, 3)
+        return (self._rng.standard_normal(size, dtype=np.float32) * NOISE).round().astype(np.int8)
 
     def fps(self, stream: Stream) -> int:
         """Frames per second of a stream."""

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from services.simulators.camera.optics import Float32, Window, project
 from services.simulators.camera.solids import Box
-from services.simulators.world import Lens, Marker
+from services.simulators.true_camera import Lens
+from services.simulators.world import Marker
 from services.vision.frames import Array, Transform
 
 Image = NDArray[np.uint8]

@@ -8,7 +8,7 @@ from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.messages import OK, Answer, Request, lines, refusal
 from services.simulators.camera.motors import CODES, Motors, Pose, reading
 from services.simulators.camera.profiles import Profile
-from services.simulators.world import WorldCamera
+from services.simulators.true_camera import WorldCamera
 
 IDLE_CODES = ("FocusNear", "FocusFar", "IrisLarge", "IrisSmall")  # accepted; a fixed lens does nothing with them
 

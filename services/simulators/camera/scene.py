@@ -7,23 +7,24 @@ drawn into the bent picture, exactly (`prints`). What the camera makes of it (no
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 from cv2.typing import MatLike
-from numpy.typing import NDArray
 
 from services.simulators.camera import prints
 from services.simulators.camera.looks import DENSITY
 from services.simulators.camera.optics import Float32, Window, rays
+from services.simulators.camera.order import Indexes, Order
 from services.simulators.camera.prints import Image, View
-from services.simulators.camera.solids import NORMALS, SIDES, boxes
+from services.simulators.camera.solids import SIDES, boxes
 from services.simulators.camera.textures import floor, generator, texture
-from services.simulators.world import Lens, World
+from services.simulators.true_camera import Lens
+from services.simulators.world import World
 from services.vision.frames import Array, Transform
 
 NEAR_M = 0.05  # nothing nearer to the lens is drawn
-TOUCHING_M = 0.001  # boxes may overlap by this much and still count as apart: things lie on tables
 LIT_GREY = 214  # what is seen past everything: daylight
 WINDOWS = 3  # kept ready: main stream, substream, and a zoomed one
 BAND_PX = 96
@@ -75,14 +76,8 @@ class Scene:
     def __init__(self, world: World, lens: Lens, seed: int) -> None:
         self.world, self.lens, self.seed = world, lens, seed
         self.boxes = boxes(world)
-        self._sides = np.array([box.sides() for box in self.boxes])  # (n, 6, 3, 3)
-        self._corners = np.array([box.corners for box in self.boxes])  # (n, 8, 3)
-        self._normals = np.array([NORMALS @ box.pose.rotation.T for box in self.boxes])  # (n, 6, 3)
-        self._offsets = np.einsum("nsk,nsk->ns", self._normals, self._sides[:, :, 0])
-        heights = np.einsum("nsk,mck->nsmc", self._normals, self._corners) - self._offsets[:, :, None, None]
-        self._outside = (heights > -TOUCHING_M).all(axis=3)  # (n, side, m): box m lies beyond that side of box n
+        self.order = Order(self.boxes)
         self._surfaces: dict[tuple[int, int], Surface] = {}
-        self._ground = self._floor_and_ceiling()
         self._bends: dict[Window, Bend] = {}
 
     def draw(self, pose: Transform, window: Window) -> Image:
@@ -100,48 +95,32 @@ class Scene:
 
     def _draw_all(self, flat: Pinhole, pose: Transform) -> None:
         to_camera = pose.inverse()
-        for surface in self._ground:
+        for surface in self._floor_and_ceiling:
             draw_surface(flat, surface, to_camera)
-        faces = np.einsum("nsk,k->ns", self._normals, pose.translation) - self._offsets > 0.0
-        for index in self._back_to_front(self._in_view(flat, to_camera), faces):
+        chosen, faces = self._in_view(flat, to_camera), self.order.facing(pose.translation)
+        for index in self.order.back_to_front(chosen, pose.translation):
             for side in np.flatnonzero(faces[index]):
-                draw_surface(flat, self._surface(int(index), int(side)), to_camera)
+                draw_surface(flat, self._surface(index, int(side)), to_camera)
 
-    def _in_view(self, flat: Pinhole, to_camera: Transform) -> NDArray[np.intp]:
+    def _in_view(self, flat: Pinhole, to_camera: Transform) -> Indexes:
         """The boxes that are not wholly behind or beside the picture."""
-        points = to_camera.apply(self._corners) @ flat.matrix.T
+        points = to_camera.apply(self.order.corners) @ flat.matrix.T
         x, y, z = np.moveaxis(points, -1, 0)
         height, width = flat.image.shape[:2]
         beside = [z < NEAR_M, x < 0, y < 0, x > width * z, y > height * z]
         return np.flatnonzero(~np.any([side.all(axis=1) for side in beside], axis=0))
 
-    def _back_to_front(self, chosen: NDArray[np.intp], faces: NDArray[np.bool_]) -> list[int]:
-        """An order in which no box is drawn over one that hides it.
-
-        A may come before B without harm when a side of A has B beyond it and the eye too, or a side of B has A
-        beyond it and the eye not. Where neither order is harmless (they overlap), the farther one comes first.
-        """
-        apart, faces = self._outside[np.ix_(chosen, np.arange(6), chosen)], faces[chosen]
-        harmless = (apart & faces[:, :, None]).any(axis=1) | (apart & ~faces[:, :, None]).any(axis=1).T
-        waits_for = ~harmless & harmless.T  # [a, b]: a must come after b
-        left, order = np.arange(len(chosen)), []
-        while len(left):
-            waiting = waits_for[np.ix_(left, left)].sum(axis=1)
-            ready = waiting == waiting.min()
-            order += [int(i) for i in chosen[left[ready]]]
-            left = left[~ready]
-        return order
-
     def _surface(self, index: int, side: int) -> Surface:
         if (index, side) not in self._surfaces:
-            box, (corner, right, down) = self.boxes[index], self._sides[index, side]
+            box, (corner, right, down) = self.boxes[index], self.order.sides[index, side]
             size = (float(np.linalg.norm(right)), float(np.linalg.norm(down)))
             image = texture(box.look, SIDES[side], size, generator(self.seed, f"{box.name} {side}"))
             self._surfaces[index, side] = Surface(corner, right, down, halving(image))
         return self._surfaces[index, side]
 
+    @cached_property
     def _floor_and_ceiling(self) -> list[Surface]:
-        low, high = self._corners.min(axis=(0, 1)), self._corners.max(axis=(0, 1))
+        low, high = self.order.corners.min(axis=(0, 1)), self.order.corners.max(axis=(0, 1))
         x, y, _ = np.diag(high - low)
         image = floor(self.world, (float(low[0]), float(low[1])), (float(x[0]), float(y[1])), self.seed)
         over = texture("ceiling", "bottom", (1.0, 1.0), generator(self.seed, "ceiling"))

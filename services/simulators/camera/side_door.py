@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 from typing import Any
 
-from services.simulators.camera.http import CameraServer, Faults
+from services.simulators.camera.http import CameraServer, Faults, Port
 from services.simulators.camera.motors import reading
 
 Order = Callable[[CameraServer, dict[str, Any]], object]
@@ -70,10 +70,8 @@ ORDERS: dict[str, Order] = {
 }
 
 
-class SideDoor(ThreadingHTTPServer):
+class SideDoor(Port):
     """Serves one camera's side door."""
-
-    daemon_threads = False
 
     def __init__(self, address: tuple[str, int], camera: CameraServer) -> None:
         super().__init__(address, Visit)
@@ -86,11 +84,13 @@ class Visit(BaseHTTPRequestHandler):
     server: SideDoor
 
     def do_GET(self) -> None:
+        """A view."""
         if self.path not in VIEWS:
             return self._send(404, {"error": f"expected one of {', '.join(VIEWS)}"})
         return self._send(200, VIEWS[self.path](self.server.camera))
 
     def do_POST(self) -> None:
+        """An order."""
         try:
             order = json.loads(self.rfile.read(int(self.headers.get("Content-Length", 0))) or b"{}")
             ORDERS[self.path](self.server.camera, order)

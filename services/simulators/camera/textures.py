@@ -13,7 +13,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from services.simulators.camera.looks import DENSITY, LOOKS, Image
-from services.simulators.world import XY, World
+from services.simulators.true_camera import XY
+from services.simulators.world import World
 
 SHADES = {"top": 1.0, "front": 0.86, "back": 0.82, "left": 0.78, "right": 0.9, "bottom": 0.8}
 
