@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-
 from services.config import Apartment, load
 from services.peers import Missing, answers, embedded, free_port, mariadb, mosquitto, ros
 from services.supervisor import Supervisor, command, in_background

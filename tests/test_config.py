@@ -23,11 +23,11 @@ def folder(tmp_path: Path) -> Path:
     return Path(shutil.copytree(CONFIG, tmp_path / "config"))
 
 
-def spoil(file: Path, old: str, new: str) -> int:
-    """Replaces a text that stands once; the line it stood in."""
+def spoil(file: Path, old: str, new: str, *, first: bool = False) -> int:
+    """Replaces a text that stands once (or its first); the line it stood in."""
     text = file.read_text(encoding="utf-8")
-    assert text.count(old) == 1, f"{old!r} stands {text.count(old)} times"
-    file.write_text(text.replace(old, new), encoding="utf-8")
+    assert text.count(old) == 1 or (first and old in text), f"{old!r} stands {text.count(old)} times"
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
     return text[: text.index(old)].count("\n") + 1
 
 
@@ -56,7 +56,7 @@ def test_the_example_is_good_once_its_secrets_are_there(monkeypatch: pytest.Monk
 def test_six_faults_of_six_kinds_are_all_told_with_file_and_line(folder: Path) -> None:
     file, home = folder / "simulated.yaml", folder / "home.yaml"
     lines = [
-        spoil(file, "    user: ros\n    password: ${CAMERA_IP1_PASSWORD:-only-simulated}\n    camera_info", "    usr: ros\n    password: x\n    camera_info"),
+        spoil(file, "    user: ros\n    password: ${CAMERA", "    usr: ros\n    password: ${CAMERA", first=True),
         spoil(file, "  port: ${APARTMENT_BROKER_PORT:-1883}", "  port: many"),
         spoil(file, "    tilt_range: [-10, 108]", "    tilt_range: [-10]"),
         spoil(file, "default_camera: ip1", "default_camera: ip7"),
@@ -90,8 +90,7 @@ def test_check_lists_every_fault_and_ends_with_two(folder: Path) -> None:
 
 def test_a_password_never_stands_in_a_fault(folder: Path) -> None:
     file = folder / "simulated.yaml"
-    spoil(file, "  url: ${APARTMENT_DATABASE:-sqlite:////tmp/apartment-simulated/bus.db}\n  password: ${APARTMENT_DATABASE_PASSWORD:-}",
-          "  url: 7\n  password: [very-secret]")  # fmt: skip
+    spoil(file, "  password: ${APARTMENT_DATABASE_PASSWORD:-}", "  password: [very-secret]")
     assert "very-secret" not in "\n".join(faults(file))
 
 

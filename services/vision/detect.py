@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .corners import refine, sample
+from services.vision.corners import refine, sample
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]

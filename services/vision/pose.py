@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .frames import Transform
-from .lens import Lens
+from services.vision.frames import Transform
+from services.vision.lens import Lens
 
 Array = NDArray[np.float64]
 

@@ -19,9 +19,18 @@ from services.simulators.camera.profiles import PROFILES
 from services.simulators.camera.scene import Scene
 from services.simulators.camera.settings import Config
 from services.simulators.camera.side_door import SideDoor
-from services.simulators.world import World, load
+from services.simulators.world import load
 
 POLL_S = 0.1  # how long a port may take to notice that it is to close
+
+
+@dataclass(frozen=True)
+class Inside:
+    """What a camera is made of behind its wire."""
+
+    device: Device
+    door: Door
+    pictures: Pictures
 
 
 @dataclass(frozen=True)
@@ -48,11 +57,8 @@ class Simulated:
 @contextmanager
 def start(config: Config, *, clock: Callable[[], float] = time.time) -> Iterator[Simulated]:
     """Runs a camera in threads of this process until the context ends. ConfigError: no such world or camera."""
-    world = load(config.folder / config.world)
-    if config.camera not in world.cameras:
-        raise ConfigError([f"camera: expected one of {', '.join(world.cameras)}, got {config.camera!r}"])
     with ExitStack() as stack:
-        server = _server(config, world, clock)
+        server = _server(config, clock)
         stack.callback(server.server_close)
         stack.callback(server.switch_off)
         stack.enter_context(_served(server))
@@ -63,13 +69,22 @@ def start(config: Config, *, clock: Callable[[], float] = time.time) -> Iterator
         yield Simulated(f"http://{config.host}:{port}", port, side.server_address[1], None, server)
 
 
-def _server(config: Config, world: World, clock: Callable[[], float]) -> CameraServer:
+def inside(config: Config, now: float) -> Inside:
+    """A camera without its network. ConfigError: no such world or camera."""
+    world = load(config.folder / config.world)
+    if config.camera not in world.cameras:
+        raise ConfigError([f"camera: expected one of {', '.join(world.cameras)}, got {config.camera!r}"])
     camera, profile = world.cameras[config.camera], PROFILES[config.profile]
-    device = Device(camera, profile, clock())
+    device = Device(camera, profile, now)
     realm, password = f"Login to {camera.serial}", config.password.get_secret_value()
     door = Door(realm, config.user, password, profile, Random(config.seed))
     pictures = Pictures(Scene(world, camera.lens, config.seed), camera, device.tables, device.motion, config.seed)
-    server = CameraServer((config.host, config.port), device, door, pictures, clock)
+    return Inside(device, door, pictures)
+
+
+def _server(config: Config, clock: Callable[[], float]) -> CameraServer:
+    behind = inside(config, clock())
+    server = CameraServer((config.host, config.port), behind.device, behind.door, behind.pictures, clock)
     if config.latency_s is not None:
         server.latency_s = config.latency_s
     return server

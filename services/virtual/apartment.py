@@ -1,0 +1,112 @@
+"""Every service of a configuration on one memory bus, driven by one clock that jumps to what is due next."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from pathlib import Path
+from typing import Any
+
+from services import camera
+from services.aside import Aside
+from services.bus.memory import Hub, MemoryBus
+from services.camera.address import Address
+from services.camera.analysis import Inline
+from services.camera.brands.amcrest import Amcrest
+from services.camera.service import CameraService
+from services.camera.start import eye
+from services.client import FINAL, Client
+from services.config import Instance, load
+from services.payloads import OrderResult
+from services.runner import Post, Runner
+from services.simulators.camera.profiles import PROFILES
+from services.simulators.camera.program import Inside, inside
+from services.simulators.camera.settings import Config as CameraSimulator
+from services.topics import CAMERA_ORDER_RESULT, SERVICE_STATUS, read
+from services.virtual.link import Lane, Link
+from services.virtual.wire import Wire
+
+START = 1_768_000_000.0  # a January morning; only the simulated weather cares
+
+
+class VirtualApartment(AbstractContextManager["VirtualApartment"]):
+    """`now` is the only clock; `client` hears everything."""
+
+    def __init__(self, config: Path, environment: Mapping[str, str]) -> None:
+        self.now = START
+        self.hub = Hub(self.clock)
+        self.apartment = load(config, environment=environment)
+        self.client = Client(MemoryBus(self.hub))
+        self.client.subscribe("#")
+        self.links: list[Link] = []
+        self._stack = ExitStack()
+        instances = self.apartment.instances.values()
+        self.runners = [self._runner(one) for one in instances if one.row.on_bus]
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def clock(self) -> float:
+        """Seconds since 1970, here."""
+        return self.now
+
+    def until(self, condition: Callable[[], bool], seconds: float) -> bool:
+        """Lets time pass until the condition holds, at most so long; whether it held."""
+        end = self.now + seconds
+        while not condition():
+            self._settle()
+            due = min([end, *(runner.due for runner in self.runners), *(link.due for link in self.links)])
+            if due >= end:
+                self.now = end
+                return condition()
+            self.now = max(self.now, due)
+            for link in self.links:
+                link.deliver(self.now)
+        return True
+
+    def order(self, camera_name: str, key: str, value: str = "", seconds: float = 600.0) -> OrderResult | None:
+        """Gives a camera an order and lets time pass until its end; None when it has none."""
+        self.client.forget()
+        topic = CAMERA_ORDER_RESULT.name(cam=camera_name)
+        ended: list[OrderResult] = []
+
+        def over() -> bool:
+            answers = [read(message, self.now).payload for message in self.client.pump() if message.topic == topic]
+            ended.extend(answer for answer in answers if answer.state in FINAL and answer.key == key)
+            return bool(ended)
+
+        self.client.say(f"camera/{camera_name}/order/{key}", value)
+        return ended[0] if self.until(over, seconds) else None
+
+    def _settle(self) -> None:
+        """Turns until nobody has anything to do at this moment."""
+        busy = True
+        while busy:
+            busy = sum(runner.turn() for runner in self.runners) > 0
+
+    def _runner(self, instance: Instance) -> Runner:
+        birth, will = (SERVICE_STATUS.message(text, service=instance.name) for text in ("online", "offline"))
+        bus = MemoryBus(self.hub, birth, will, durable=instance.row.durable)
+        service = self._stack.enter_context(self._start(instance, bus.post))
+        return Runner(instance.name, service, bus, self.clock, Aside())
+
+    def _start(self, instance: Instance, post: Post) -> AbstractContextManager[Any]:
+        if isinstance(instance.config, camera.Config):
+            return nullcontext(self._camera(instance.config, post))
+        started: AbstractContextManager[Any] = importlib.import_module(instance.row.module).start(instance.config, post)
+        return started
+
+    def _camera(self, config: camera.Config, post: Post) -> CameraService:
+        """The service as it is, on a wire to the simulated camera of this configuration."""
+        simulator = self.apartment.instances["simulated-camera"].config
+        assert isinstance(simulator, CameraSimulator)
+        behind = inside(simulator, self.now)
+        address = Address(config.url, config.user, config.password, config.rtsp_port, config.channel)
+        link = Link(*(self._lane(simulator, behind, address, post) for _ in range(2)))
+        self.links.append(link)
+        return CameraService(config, link, lambda: Inline(post), eye(config))
+
+    def _lane(self, simulator: CameraSimulator, behind: Inside, address: Address, post: Post) -> Lane:
+        wire = Wire(behind, PROFILES[simulator.profile], simulator.seed)
+        return Lane(Amcrest(address, wire), wire, post, self.clock)
