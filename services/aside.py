@@ -29,9 +29,14 @@ class Aside:
         for file in sorted(folder.glob("*.json")) if folder and folder.is_dir() else ():
             self._crashes[file.stem] = int(json.loads(file.read_text(encoding="utf-8"))["crashes"])
 
+    @property
+    def any(self) -> bool:
+        """Whether anything ever crashed the service."""
+        return bool(self._crashes)
+
     def holds(self, message: Message) -> bool:
         """Whether this very message is put aside."""
-        return bool(self._crashes) and self._crashes.get(_key(message), 0) >= CRASHES
+        return self._crashes.get(_key(message), 0) >= CRASHES
 
     def names(self) -> list[str]:
         """The files of those put aside."""

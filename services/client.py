@@ -10,7 +10,6 @@ import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any
 
 from services.bus import Bus, Message, topic_matches
@@ -113,7 +112,7 @@ def connected(
                 raise TimeoutError(f"no broker answers at {settings.host}:{settings.port}")
             waiting += bus.receive(0.05)
         client = Client(bus)
-        client.seen += [replace(message, token=None) for message in waiting]
+        client.seen += [message._replace(token=None) for message in waiting]
         yield client
     finally:
         bus.close()

@@ -55,7 +55,8 @@ class Runner:
         self.clock = clock
         self.aside = aside
         self.log = logging.getLogger(f"services.run.{name}")
-        self.counters: Counter[str] = Counter()
+        self.counters: Counter[str] = Counter(bad=0, aside=0)
+        self.received = self.published = 0
         self._started = clock()
         self._batch: list[Message] = []  # of this turn; kept while it cannot be completed
         self._handled = 0
@@ -81,7 +82,7 @@ class Runner:
         if self._waiting_for:
             self.bus.receive(wait_s, most=0)
         else:
-            self._batch, self._handled = self.bus.receive(wait_s), 0
+            self._batch, self._handled = self._without_put_aside(self.bus.receive(wait_s)), 0
         now = self.clock()
         if not self._complete(now):
             self._report(now)
@@ -90,6 +91,13 @@ class Runner:
         worked, self._batch = bool(self._batch), []
         self._report(now)
         return worked
+
+    def _without_put_aside(self, came: list[Message]) -> list[Message]:
+        self.received += len(came)
+        held = [message for message in came if self.aside.holds(message)] if self.aside.any else []
+        self.bus.ack(held)
+        self.counters["aside"] += len(held)
+        return [message for message in came if message not in held] if held else came
 
     def _complete(self, now: float) -> bool:
         """Handles what is left of the batch and ticks; False when something we need is away."""
@@ -110,12 +118,9 @@ class Runner:
         return True
 
     def _one(self, message: Message, now: float) -> None:
-        self.counters["received"] += 1
-        if self.aside.holds(message):
-            self.counters["aside"] += 1
-            return
         try:
-            self._publish(self.service.handle(message, now))
+            for said in self.service.handle(message, now):
+                self._publish(said)
         except BadMessage as error:
             self._dropped("bad", str(error), now)
         except DeviceError as error:
@@ -127,16 +132,16 @@ class Runner:
                 self.aside.crashed(message, now)
             raise
 
+    def _publish(self, message: Message) -> None:
+        self.published += 1
+        self.bus.publish(message)
+
     def _tick(self, now: float) -> None:
         try:
-            self._publish(self.service.tick(now))
+            for said in self.service.tick(now):
+                self._publish(said)
         except DeviceError as error:
             self._dropped("device_errors", str(error), now)
-
-    def _publish(self, messages: Iterable[Message]) -> None:
-        for message in messages or ():
-            self.counters["published"] += 1
-            self.bus.publish(message)
 
     def _dropped(self, counter: str, text: str, now: float) -> None:
         self.counters[counter] += 1
@@ -161,12 +166,13 @@ class Runner:
     def info(self) -> ServiceInfo:
         """What the service says of itself on `service/<service>/info`."""
         counters: dict[str, float] = {
-            "received": 0, "published": 0, "bad": 0,
+            "received": self.received,
+            "published": self.published,
             **self.counters,
             **{str(name): float(value) for name, value in getattr(self.service, "counters", {}).items()},
             "dropped": self.bus.dropped,
             "connections": self.bus.connections,
-        }  # fmt: skip
+        }
         return ServiceInfo(
             version=__version__, started=stamp(self._started), counters=counters, aside=self.aside.names()
         )
@@ -177,5 +183,5 @@ class Runner:
             level, text = 2, f"waiting: {self._waiting_for}"
         elif now - self._warned[0] < WARN_FOR_S:
             level, text = 1, f"dropped: {self._warned[1]}"
-        values = {name: str(self.counters[name]) for name in ("received", "published", "bad")}
+        values = {"received": str(self.received), "published": str(self.published), "bad": str(self.counters["bad"])}
         return Diagnostic(level=level, message=text[:400], values=values, hardware_id=self.name)

@@ -7,7 +7,7 @@ What a row is stands in `topic.py`, the payload models in `payloads.py`, OpenHAB
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -246,7 +246,7 @@ def reply(message: Message, to: Message) -> Message | None:
     """The same answer for the one who asked by MQTT 5's response topic; None when nobody did."""
     if not to.reply_to:
         return None
-    return replace(message, topic=to.reply_to, retain=False, correlation=to.correlation)
+    return message._replace(topic=to.reply_to, retain=False, correlation=to.correlation)
 
 
 def markdown(rows: Iterable[Topic] = TABLE) -> str:

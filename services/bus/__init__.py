@@ -7,15 +7,13 @@ One contract test, `tests/bus/test_contract.py`, runs against all of them.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 WAKE_TOPIC = "/bus/wake"  # posted to end a wait; no service sees it
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
-    """One message, as it travels and as a service sees it.
+class Message(NamedTuple):
+    """One message, as it travels and as a service sees it. A tuple, since one is made for each that comes.
 
     Bus topics never begin with `/`; locally posted ones (`/camera/reply`) do, and carry `value`, any object that
     nobody changes any more, instead of a payload. `received` is the receiver's clock in seconds at arrival.
@@ -40,7 +38,8 @@ class Bus(Protocol):
 
     States (`retain`) are remembered and published again after every reconnect. While there is no connection
     events wait in a bounded queue (the oldest goes first when it is full, counted in `dropped`), and commands,
-    which have an expiry, are dropped and counted: a late command is worse than none (`outbox.py`).
+    which have an expiry, are dropped and counted: a late command is worse than none (`outbox.py`). What comes waits in
+    an inbox; QoS 1 is held back by the window of unacknowledged messages, of QoS 0 the newest are dropped and counted.
     """
 
     connections: int
@@ -52,7 +51,7 @@ class Bus(Protocol):
 
     @property
     def dropped(self) -> int:
-        """How many messages could not be kept while there was no connection."""
+        """How many messages were not sent for want of a connection, or not taken for want of time."""
         ...
 
     def subscribe(self, filters: Sequence[str]) -> None:

@@ -9,7 +9,6 @@ import queue
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 
 from services.bus import WAKE_TOPIC, Message, topic_matches
 from services.bus.outbox import Outbox
@@ -34,7 +33,7 @@ class Hub:
                 del self.retained[message.topic]
         for client in list(self.clients):
             if client.wants(message.topic):
-                client.take(replace(message, retain=False))
+                client.take(message._replace(retain=False))
 
     def down(self, *, forget: bool = False) -> None:
         """The broker goes away, every connection breaks. `forget`: it had no persistence, retained states go too."""
@@ -105,7 +104,7 @@ class MemoryBus:
 
     def take(self, message: Message) -> None:
         """Puts a delivered message into the inbox."""
-        taken = replace(message, received=self.hub.clock(), token=self.connections)
+        taken = message._replace(received=self.hub.clock(), token=self.connections)
         if message.qos and self.durable:
             self._unacked.append(taken)
         if self.connected:
@@ -123,7 +122,7 @@ class MemoryBus:
 
     def post(self, message: Message) -> None:
         """See `Bus`."""
-        self._inbox.put(replace(message, received=self.hub.clock()))
+        self._inbox.put(message._replace(received=self.hub.clock()))
 
     def receive(self, timeout: float | None = 0.0, most: int = WINDOW) -> list[Message]:
         """See `Bus`."""

@@ -14,8 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import paho.mqtt.client as paho
 from paho.mqtt.enums import MQTTErrorCode
@@ -29,13 +28,15 @@ from services.bus.outbox import Outbox
 
 log = logging.getLogger(__name__)
 
+BUSY = 4  # messages taken at once that tell of a flood; one at a time then costs a change of threads for each
+GATHER_S = 0.002  # in a flood the next ones are left to gather so long
+INBOX = 20_000  # waiting messages, beyond which those of QoS 0 are dropped
 RETRY_S = (0.1, 1.0)  # between attempts to connect: first, longest; a restarted broker is met again within 2 s
 FAREWELL_S = 2.0
 WAKE = Message(WAKE_TOPIC)
 
 
-@dataclass(frozen=True, slots=True)
-class Token:
+class Token(NamedTuple):
     """What acknowledges a message: only within the connection that it came by."""
 
     connection: int
@@ -65,12 +66,15 @@ class MqttBus:
         self._outbox = Outbox(self._send, birth)
         self._in_flight: dict[int, Message] = {}  # events that the broker has not acknowledged yet
         self._acknowledged: deque[int] = deque()
+        self._to_acknowledge: deque[Token] = deque()
         self._client: paho.Client | None = None
         self._up = 0  # the number of the connection that stands; set by paho's thread
         self._greeted = 0  # the one on which the outbox has spoken; set by the service's thread
         self._closing = threading.Event()
         self._lost = threading.Event()
         self._told = ""
+        self._overrun = 0
+        self._busy = False
         self._keeper = threading.Thread(target=self._keep_connected, name="bus", daemon=True)
         self._keeper.start()
 
@@ -81,8 +85,8 @@ class MqttBus:
 
     @property
     def dropped(self) -> int:
-        """How many messages could not be kept while there was no connection."""
-        return self._outbox.dropped
+        """How many messages were not sent for want of a connection, or not taken for want of time."""
+        return self._outbox.dropped + self._overrun
 
     # -- what the service calls
 
@@ -98,33 +102,34 @@ class MqttBus:
 
     def post(self, message: Message) -> None:
         """See `Bus`."""
-        self._inbox.put(replace(message, received=self._clock()))
+        self._inbox.put(message._replace(received=self._clock()))
 
     def receive(self, timeout: float | None = 0.0, most: int = WINDOW) -> list[Message]:
         """See `Bus`."""
         self._keep_up()
-        taken: list[Message] = []
         if not most:
             self._lost.wait(timeout)
+            return []
+        if self._busy:
+            time.sleep(GATHER_S)
+        get, taken = self._inbox.get_nowait, []
         try:
-            if most:
-                taken.append(self._inbox.get(timeout=timeout) if timeout != 0.0 else self._inbox.get_nowait())
+            taken.append(self._inbox.get(timeout=timeout) if timeout != 0.0 else get())
             while len(taken) < most:
-                taken.append(self._inbox.get_nowait())
+                taken.append(get())
         except queue.Empty:
             pass
         self._keep_up()
-        return [message for message in taken if self._is_to_handle(message)]
+        self._busy = len(taken) >= BUSY
+        return self._to_handle(taken)
 
     def ack(self, messages: Iterable[Message]) -> None:
         """See `Bus`."""
-        client, connection = self._client, self.connections
-        if client is None or not self.connected:
-            return
-        for message in messages:
-            token = message.token
-            if isinstance(token, Token) and token.connection == connection and message.qos:
-                client.ack(token.mid, message.qos)
+        self._to_acknowledge.extend([one.token for one in messages if one.qos and isinstance(one.token, Token)])
+        if (
+            self._inbox.empty()
+        ):  # else the network's thread does it at the next message: two busy threads hinder each other
+            self._acknowledge()
 
     def close(self) -> None:
         """See `Bus`."""
@@ -139,6 +144,17 @@ class MqttBus:
 
     # -- the service's thread, inside
 
+    def _acknowledge(self) -> None:
+        """From either thread; what came by an older connection is left out."""
+        client = self._client
+        while self._to_acknowledge and client is not None:
+            try:
+                token = self._to_acknowledge.popleft()
+            except IndexError:  # the other thread was faster
+                return
+            if token.connection == self._up:
+                client.ack(token.mid, 1)
+
     def _keep_up(self) -> None:
         self._forget_acknowledged()
         up = self._up
@@ -150,10 +166,12 @@ class MqttBus:
         elif up:
             self._outbox.drain()
 
-    def _is_to_handle(self, message: Message) -> bool:
-        token = message.token
-        came_before = isinstance(token, Token) and token.connection != self.connections
-        return message.topic != WAKE_TOPIC and not (self.address.durable and came_before)
+    def _to_handle(self, taken: list[Message]) -> list[Message]:
+        """Without what only woke us, and without what the broker will send a durable client again."""
+        if self.address.durable:
+            now = self.connections
+            taken = [one for one in taken if not isinstance(one.token, Token) or one.token.connection == now]
+        return [one for one in taken if one.topic != WAKE_TOPIC]
 
     def _send(self, message: Message) -> bool:
         client = self._client
@@ -271,19 +289,16 @@ class MqttBus:
             topic = message.topic
         except UnicodeDecodeError:  # a broker must refuse it (MQTT 5, 1.5.4); it would end this thread
             return
-        properties = message.properties
-        self._inbox.put(
-            Message(
-                topic=topic,
-                payload=bytes(message.payload),
-                retain=message.retain,
-                qos=message.qos,
-                received=self._clock(),
-                reply_to=getattr(properties, "ResponseTopic", None) if properties else None,
-                correlation=getattr(properties, "CorrelationData", None) if properties else None,
-                token=Token(self.connections, message.mid, message.dup),
-            )
-        )
+        if message.qos == 0 and self._inbox.qsize() > INBOX:  # QoS 1 is held back by the window instead
+            self._overrun += 1
+            return
+        token = Token(self.connections, message.mid, message.dup)
+        came = Message(topic, bytes(message.payload), message.retain, message.qos, self._clock(), token=token)
+        asked = message.properties
+        if asked is not None and hasattr(asked, "ResponseTopic"):
+            came = came._replace(reply_to=asked.ResponseTopic, correlation=getattr(asked, "CorrelationData", None))
+        self._inbox.put(came)
+        self._acknowledge()
 
     def _on_publish(self, _client: paho.Client, _data: Any, mid: int, _reason: Any, _properties: Any) -> None:
         self._acknowledged.append(mid)

@@ -11,7 +11,6 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from pydantic import Field, SecretStr, field_validator
@@ -172,6 +171,6 @@ class Persistence:
             text = self._decisions.last_text(name, storage.items)
             if text is not None:
                 self._restore.says(name, text)
-                said.append(replace(topics.HOME_STATE.message(text, item=name), once=True))
+                said.append(topics.HOME_STATE.message(text, item=name)._replace(once=True))
         self.counters["restored"] += len(said)
         return said

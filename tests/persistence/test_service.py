@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
@@ -32,12 +31,12 @@ HOME = Home(
         "Secret": Item(type="String", label="Secret", persist=()),
     }
 )
-ONLINE = replace(SERVICE_STATUS.message("online", service="persistence"), received=T + 10)
+ONLINE = SERVICE_STATUS.message("online", service="persistence")._replace(received=T + 10)
 
 
 def state(item: str, text: str, at: float = 0.0, *, retained: bool = False) -> Message:
     """A state as it arrives."""
-    return replace(HOME_STATE.message(text, item=item), received=T + at, retain=retained)
+    return HOME_STATE.message(text, item=item)._replace(received=T + at, retain=retained)
 
 
 def url(address: Address) -> str:
@@ -164,7 +163,7 @@ def test_the_retained_states_of_a_reconnect_make_no_rows(database: Database) -> 
 def test_diagnostics_are_stored_when_they_change(database: Database) -> None:
     def told(level: int, message: str, at: float) -> Message:
         diagnostic = Diagnostic(level=level, message=message, values={"at": str(at)})
-        return replace(DIAGNOSTICS.message(diagnostic, component="camera/ip1"), received=T + at, retain=False)
+        return DIAGNOSTICS.message(diagnostic, component="camera/ip1")._replace(received=T + at, retain=False)
 
     with running(database) as service:
         turn(service, told(0, "fine", 1), told(0, "fine", 2), told(2, "no answer", 3), told(2, "no answer", 4))
@@ -177,7 +176,7 @@ def test_diagnostics_are_stored_when_they_change(database: Database) -> None:
 def test_an_order_is_one_row_that_ends_in_its_final_state(database: Database) -> None:
     def told(outcome: str, at: float) -> Message:
         result = OrderResult.model_validate({"id": "o1", "key": "Goto", "value": "Kitchen", "state": outcome})
-        return replace(CAMERA_ORDER_RESULT.message(result, cam="ip1"), received=T + at)
+        return CAMERA_ORDER_RESULT.message(result, cam="ip1")._replace(received=T + at)
 
     with running(database) as service:
         turn(service, told("accepted", 1), told("running", 2))
@@ -201,9 +200,9 @@ class TestRestoring:
                 ("home/Temp/state", "21 °C", True, True),
             ]
             assert service.due is None
-            echoes = [replace(one, retain=False, received=T + 12.1) for one in said]
+            echoes = [one._replace(retain=False, received=T + 12.1) for one in said]
             turn(service, *echoes)
-            turn(service, *(replace(one, retain=True, received=T + 13) for one in said))
+            turn(service, *(one._replace(retain=True, received=T + 13) for one in said))
             assert turn(service, now=T + 99) == []
             assert service.counters["restored"] == 2
         assert [row[1] for row in stored(database, "Power")] == [5.0]
@@ -223,7 +222,7 @@ class TestRestoring:
         with running(database) as service:
             turn(service, ONLINE)
             (restored,) = turn(service, now=T + 12)
-            turn(service, replace(restored, retain=False, received=T + 12))
+            turn(service, restored._replace(retain=False, received=T + 12))
             turn(service, state("Power", "5 W", 13))
         assert [row[0] for row in stored(database, "Power")] == [1, 13]
 
