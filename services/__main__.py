@@ -42,7 +42,8 @@ def run(services: Annotated[list[str] | None, typer.Argument()] = None, config: 
     supervisor = Supervisor({name: command(name, config.resolve()) for name in names})
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: supervisor.stop())
-    supervisor.run(lambda ready: _say(process.ready_line("run", {"services": ready})))
+    broker = {"host": apartment.bus.host, "port": apartment.bus.port}
+    supervisor.run(lambda ready: _say(process.ready_line("run", {"broker": broker, "services": ready})))
 
 
 @app.command(epilog="Example: apartment serve bridge")
@@ -67,7 +68,8 @@ def demo(
     """Run the whole apartment, simulated, and tell its story."""
     from services import demo as story  # it brings every service's libraries
 
-    process.log_to_stderr(logging.WARNING)
+    process.log_to_stderr(logging.ERROR)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # what was started is ended on the way out
     if not story.demo(out, once=once):
         raise typer.Exit(1)
 

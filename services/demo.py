@@ -22,6 +22,7 @@ from services import client, persistence, topics
 from services.client import Client
 from services.config import Apartment
 from services.payloads import Order, OrderResult, ScanResult, ScanState
+from services.process import ready_line
 from services.simulated import Parts, Simulated, parts_of, services_of
 from services.simulators.world import World
 from services.simulators.world import load as load_world
@@ -30,6 +31,7 @@ from services.storage import open_storage
 TARGET = 582
 WITHIN_M = 0.10  # contract section 1
 SCAN_S = 240.0
+LOG_SHOWN = 4000  # characters of the services' log, when something went wrong
 
 
 def demo(out: Console, *, once: bool) -> bool:
@@ -41,7 +43,10 @@ def demo(out: Console, *, once: bool) -> bool:
         with out.status("Starting the services ..."):
             running = stack.enter_context(services_of(Path(name), parts))
         _show_services(out, running)
-        return _story(out, running, once=once)
+        good = _story(out, running, once=once)
+        if not good:
+            out.print(running.log.read_text(errors="replace")[-LOG_SHOWN:], style="dim", markup=False)
+        return good
 
 
 def _show_parts(out: Console, parts: Parts) -> None:
@@ -52,7 +57,9 @@ def _show_parts(out: Console, parts: Parts) -> None:
 
 
 def _show_services(out: Console, running: Simulated) -> None:
+    out.print(ready_line("demo", running.addresses), markup=False, style="dim")
     out.print(f"Running: {', '.join(running.ready)}.")
+    out.print(f"Their log: {running.log}", style="dim")
     port = running.apartment.bus.port
     out.print(f"Try it: mosquitto_pub -p {port} -t home/Kitchen_Light/command -m ON", style="dim")
     out.print(f"        mosquitto_sub -p {port} -v -t 'home/#' -t 'camera/#'", style="dim")

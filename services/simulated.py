@@ -54,6 +54,21 @@ class Simulated:
     supervisor: Supervisor
     ready: dict[str, Any]
 
+    @property
+    def addresses(self) -> dict[str, Any]:
+        """What a program that attaches wants to know; the database's address has no password in it."""
+        return {
+            "broker": {"host": self.apartment.bus.host, "port": self.apartment.bus.port},
+            "database": self.parts.environment["APARTMENT_DATABASE"],
+            "ros_master_uri": self.parts.ros.uri if self.parts.ros else None,
+            "services": self.ready,
+        }
+
+    @property
+    def log(self) -> Path:
+        """What the services log."""
+        return self.folder / "services.log"
+
 
 @contextmanager
 def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
@@ -76,7 +91,8 @@ def services_of(folder: Path, parts: Parts, without: Collection[str] = ()) -> It
     shutil.copytree(CONFIG, config.parent)  # saved places and the like are not to change the repository
     apartment = load(config, environment={**os.environ, **parts.environment})
     names = [name for name in apartment.instances if name not in without and (name != "bridge" or parts.ros)]
-    supervisor = Supervisor({name: command(name, config) for name in names}, parts.environment)
+    commands = {name: command(name, config) for name in names}
+    supervisor = Supervisor(commands, parts.environment, folder / "services.log")
     with in_background(supervisor) as ready:
         yield Simulated(folder, config, apartment, parts, supervisor, ready)
 

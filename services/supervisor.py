@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ log = logging.getLogger(__name__)
 
 SETTLED_S = 10.0  # a service that lived so long starts again at once
 BACKOFF_S = (0.2, 30.0)  # after a short life: first, longest; doubled each time
+READY_S = 60.0  # a small machine imports OpenCV for some seconds
 GRACE_S = 5.0  # between SIGTERM and SIGKILL
 
 
@@ -51,7 +52,13 @@ def command(name: str, config: Path) -> list[str]:
 class Supervisor:
     """Watches its children from one thread; one thread per child only reads what it prints."""
 
-    def __init__(self, commands: Mapping[str, Sequence[str]], environment: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        commands: Mapping[str, Sequence[str]],
+        environment: Mapping[str, str] | None = None,
+        log_file: Path | None = None,
+    ) -> None:
+        self.log_file = log_file  # for what the children log; None: our own standard error
         self.children = {name: Child(name, line) for name, line in commands.items()}
         self._environment = {**os.environ, **(environment or {}), SUPERVISED: str(os.getpid())}
         self._news: queue.SimpleQueue[tuple[str, Child | None, str]] = queue.SimpleQueue()
@@ -62,7 +69,7 @@ class Supervisor:
         self._stopping = True
         self._news.put(("stop", None, ""))
 
-    def run(self, all_ready: Callable[[dict[str, Any]], None], tell: Callable[[str], None] | None = None) -> None:
+    def run(self, all_ready: Callable[[dict[str, Any]], None]) -> None:
         """Until `stop`. `all_ready` gets every child's READY once, when the last is ready."""
         told = False
         try:
@@ -81,10 +88,11 @@ class Supervisor:
                 self._start(child, now)
 
     def _start(self, child: Child, now: float) -> None:
-        child.process = subprocess.Popen(
-            child.command, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, env=self._environment, text=True,
-            start_new_session=True,
-        )  # fmt: skip
+        with self.log_file.open("ab") if self.log_file else nullcontext() as errors:
+            child.process = subprocess.Popen(
+                child.command, stdout=subprocess.PIPE, stderr=errors, stdin=subprocess.DEVNULL, env=self._environment,
+                text=True, start_new_session=True,
+            )  # fmt: skip
         child.started, child.start_at, child.ready = now, None, None
         child.restarts += 1
         threading.Thread(target=self._read, args=(child, child.process), daemon=True, name=child.name).start()
@@ -139,12 +147,20 @@ def _outcome(code: int) -> str:
 
 @contextmanager
 def in_background(supervisor: Supervisor) -> Iterator[dict[str, Any]]:
-    """Runs a supervisor in a thread; yields what the children said once all are ready."""
+    """Runs a supervisor in a thread; yields what the children said once all are ready. TimeoutError after 60 s."""
     ready: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
     thread = threading.Thread(target=supervisor.run, args=(ready.put,), name="supervisor", daemon=True)
     thread.start()
     try:
-        yield ready.get(timeout=60.0)
+        yield _all_of(supervisor, ready)
     finally:
         supervisor.stop()
         thread.join(GRACE_S + 5.0)
+
+
+def _all_of(supervisor: Supervisor, ready: queue.SimpleQueue[dict[str, Any]]) -> dict[str, Any]:
+    try:
+        return ready.get(timeout=READY_S)
+    except queue.Empty:
+        late = ", ".join(name for name, child in supervisor.children.items() if child.ready is None)
+        raise TimeoutError(f"not ready within {READY_S:.0f} s: {late}") from None
