@@ -43,7 +43,11 @@ def demo(out: Console, *, once: bool) -> bool:
         with out.status("Starting the services ..."):
             running = stack.enter_context(services_of(Path(name), parts))
         _show_services(out, running)
-        good = _story(out, running, once=once)
+        try:
+            good = _story(out, running, once=once)
+        except TimeoutError as error:
+            out.print(str(error), style="bold red", markup=False)
+            good = False
         if not good:
             out.print(running.log.read_text(errors="replace")[-LOG_SHOWN:], style="dim", markup=False)
         return good

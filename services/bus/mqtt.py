@@ -22,7 +22,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
-from services.bus import WAKE_TOPIC, Message, connection
+from services.bus import WAKE_TOPIC, Message, connection, topic_matches
 from services.bus.connection import CONNECT_TIMEOUT_S, WINDOW, Address
 from services.bus.outbox import Outbox
 
@@ -289,6 +289,8 @@ class MqttBus:
             topic = message.topic
         except UnicodeDecodeError:  # a broker must refuse it (MQTT 5, 1.5.4); it would end this thread
             return
+        if message.retain and not any(topic_matches(wanted, topic) for wanted in self._filters):
+            return  # amqtt 0.12 hands out retained messages that nobody asked for
         if message.qos == 0 and self._inbox.qsize() > INBOX:  # QoS 1 is held back by the window instead
             self._overrun += 1
             return
