@@ -88,6 +88,19 @@ def negotiate(address: Address) -> Protocol:
     return spoken[0]
 
 
+def properties(message: Message, protocol: Protocol) -> Properties | None:
+    """What MQTT 5 sends beside the payload; None where there is nothing, or no MQTT 5."""
+    said = {"MessageExpiryInterval": message.expires_s, "CorrelationData": message.correlation,
+            "ResponseTopic": message.reply_to}  # fmt: skip
+    if protocol != 5 or all(value is None for value in said.values()):
+        return None
+    made = Properties(PacketTypes.PUBLISH)  # type: ignore[no-untyped-call]
+    for name, value in said.items():
+        if value is not None:
+            setattr(made, name, value)
+    return made
+
+
 def _session(address: Address, protocol: Protocol) -> dict[str, Any]:
     if protocol != 5:
         return {}

@@ -18,8 +18,6 @@ from typing import Any, NamedTuple
 
 import paho.mqtt.client as paho
 from paho.mqtt.enums import MQTTErrorCode
-from paho.mqtt.packettypes import PacketTypes
-from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
 from services.bus import WAKE_TOPIC, Message, connection, topic_matches
@@ -178,7 +176,11 @@ class MqttBus:
         if client is None:
             return False
         info = client.publish(
-            message.topic, message.payload, qos=message.qos, retain=message.retain, properties=self._properties(message)
+            message.topic,
+            message.payload,
+            qos=message.qos,
+            retain=message.retain,
+            properties=connection.properties(message, self._protocol),
         )
         if info.rc == MQTTErrorCode.MQTT_ERR_QUEUE_SIZE or (
             info.rc == MQTTErrorCode.MQTT_ERR_NO_CONN and message.qos == 0
@@ -187,20 +189,6 @@ class MqttBus:
         if message.qos and not message.expires_s and (not message.retain or message.once):
             self._in_flight[info.mid] = message
         return True
-
-    def _properties(self, message: Message) -> Properties | None:
-        if self._protocol != 5 or (
-            message.expires_s is None and message.correlation is None and message.reply_to is None
-        ):
-            return None
-        properties = Properties(PacketTypes.PUBLISH)  # type: ignore[no-untyped-call]
-        if message.expires_s is not None:
-            properties.MessageExpiryInterval = message.expires_s
-        if message.correlation is not None:
-            properties.CorrelationData = message.correlation
-        if message.reply_to is not None:
-            properties.ResponseTopic = message.reply_to
-        return properties
 
     def _forget_acknowledged(self) -> None:
         while self._acknowledged:
