@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import signal
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,7 +20,7 @@ from services import access, client, process, topics
 from services.bus import Message
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
-from services.payloads import OrderResult
+from services.payloads import OrderResult, stamp
 from services.supervisor import Supervisor, command
 
 app = typer.Typer(
@@ -29,6 +30,7 @@ app = typer.Typer(
 Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
 Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
 CONFIG = Path("config/apartment.yaml")
+STATUS_S = 1.0  # how long retained states may take to come
 out = Console(soft_wrap=True, highlight=False)
 err = Console(stderr=True, soft_wrap=True, highlight=False)
 
@@ -105,9 +107,7 @@ def status(config: Config = CONFIG, json: Json = False) -> None:
     apartment = load(config)
     filters = (topics.SERVICE_STATUS.filter, topics.SERVICE_INFO.filter)
     with client.connected(apartment.bus, filters) as bus:
-        bus.pump(0.5)
-        bus.pump(0.5)
-        rows = _status_rows(apartment, bus.seen)
+        rows = _status_rows(apartment, bus.collect(STATUS_S))
     if json:
         out.print_json(data=rows)
     else:
@@ -117,7 +117,9 @@ def status(config: Config = CONFIG, json: Json = False) -> None:
 
 
 @app.command(epilog="Example: apartment order ip1 Goto Kitchen")
-def order(camera: str, key: str, value: str = "", config: Config = CONFIG, json: Json = False) -> None:
+def order(
+    camera: str, key: str, value: Annotated[str, typer.Argument()] = "", config: Config = CONFIG, json: Json = False
+) -> None:
     """Give a camera an order and wait until it is done."""
     with client.connected(load(config).bus, (topics.CAMERA_ORDER_RESULT.filter,)) as bus:
         _ended(bus.order(camera, key, value, tell=None if json else _tell_order), json)
@@ -138,6 +140,27 @@ def scan(
     for message in found.values():
         out.print_json(message.payload.decode()) if json else out.print(topics.read(message, message.received).payload)
     if result.state != "done" or not found:
+        raise typer.Exit(1)
+
+
+@app.command(epilog="Example: apartment history Kitchen_Light --limit 5")
+def history(item: str, limit: int = 20, config: Config = CONFIG, json: Json = False) -> None:
+    """Show the newest stored states of an item, oldest first; exit 1 when there are none."""
+    from services import persistence, storage  # the database's libraries, for this command alone
+
+    settings = load(config, ("persistence",)).instances["persistence"].config
+    assert isinstance(settings, persistence.Config)
+    with closing(storage.open_storage(settings.address)) as opened:
+        rows = [
+            (stamp(one.time / 1e6), one.num if one.text is None else one.text)
+            for one in opened.samples(item, limit=limit)
+        ]
+    if json:
+        out.print_json(data={"item": item, "samples": rows})
+    else:
+        for time, value in rows:
+            _say(f"{time}  {value}")
+    if not rows:
         raise typer.Exit(1)
 
 

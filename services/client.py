@@ -48,6 +48,13 @@ class Client:
         self.seen.extend(came)
         return came
 
+    def collect(self, seconds: float) -> list[Message]:
+        """Everything seen, after listening that long: what retained states are there."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self.pump(left)
+        return self.seen
+
     def until(self, condition: Callable[[Message], bool], timeout_s: float = 10.0, what: str = "a message") -> Message:
         """The first message, seen already or still to come, that satisfies; TimeoutError names what was awaited."""
         end = time.monotonic() + timeout_s

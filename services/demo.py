@@ -70,7 +70,7 @@ def _show_services(out: Console, running: Simulated) -> None:
 
 
 def _story(out: Console, running: Simulated, *, once: bool) -> bool:
-    filters = [row.filter for row in (topics.HOME_STATE, topics.CAMERA_STATUS, topics.CAMERA_ORDER_RESULT,
+    filters = [row.filter for row in (topics.HOME_STATE, topics.CAMERA_ORDER_RESULT,
                                       topics.CAMERA_SCAN_STATE, topics.CAMERA_SCAN_RESULT)]  # fmt: skip
     apartment = running.apartment
     with client.connected(apartment.bus, filters) as bus:
@@ -91,7 +91,6 @@ def _home_lives(out: Console, bus: Client) -> None:
 
 
 def _scan(out: Console, bus: Client, camera: str) -> ScanResult | None:
-    bus.payload(topics.CAMERA_STATUS.name(cam=camera), lambda status: status.state == "online", 30.0)
     out.print(f"The camera {camera} looks for marker {TARGET} ...")
     with _progress(out) as advance:
         end = _order_scan(bus, camera, advance)

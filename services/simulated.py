@@ -14,9 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from services.client import connected
 from services.config import Apartment, load
 from services.peers import Missing, answers, embedded, free_port, mariadb, mosquitto, ros
-from services.supervisor import Supervisor, command, in_background
+from services.supervisor import READY_S, Supervisor, command, in_background
+from services.topics import CAMERA_STATUS
 
 CONFIG = Path(__file__).parents[1] / "config"
 USUAL_BROKER_PORT = 1883
@@ -84,16 +86,24 @@ def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
         yield parts
 
 
+def _wait_for_cameras(apartment: Apartment, names: Collection[str]) -> None:
+    with connected(apartment.bus, [CAMERA_STATUS.filter]) as client:
+        for camera in apartment.cameras:
+            if f"camera-{camera}" in names:
+                client.payload(CAMERA_STATUS.name(cam=camera), lambda status: status.state == "online", READY_S)
+
+
 @contextmanager
 def services_of(folder: Path, parts: Parts, without: Collection[str] = ()) -> Iterator[Simulated]:
-    """Starts the services and waits until all are ready; they end with the block."""
+    """Starts the services, waits until they and the cameras answer, and ends them with the block."""
     config = folder / "config" / "simulated.yaml"
     shutil.copytree(CONFIG, config.parent)  # saved places and the like are not to change the repository
     apartment = load(config, environment={**os.environ, **parts.environment})
-    names = [name for name in apartment.instances if name not in without and (name != "bridge" or parts.ros)]
+    names = [name for name in apartment.instances if name not in without]
     commands = {name: command(name, config) for name in names}
     supervisor = Supervisor(commands, parts.environment, folder / "services.log")
     with in_background(supervisor) as ready:
+        _wait_for_cameras(apartment, names)
         yield Simulated(folder, config, apartment, parts, supervisor, ready)
 
 
@@ -137,7 +147,8 @@ def _start_ros(stack: ExitStack, parts: Parts, real: bool) -> None:
         _only_if(real, "ROS")
         parts.ros = stack.enter_context(ros.private(parts.folder / "ros"))
     except Missing as missing:
-        parts.note("robot", "no ROS, no bridge", missing)
+        parts.environment["APARTMENT_WITHOUT_ROS"] = "true"
+        parts.note("robot", "no ROS, a bridge to nowhere", missing)
     else:
         parts.environment.update(parts.ros.env)
         parts.note("robot", f"ROS 1, ROS_MASTER_URI={parts.ros.uri}")

@@ -61,7 +61,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.supervisor": ("services.process",),
     "services.client": (*CORE, *BUSES, *SHELL),
     "services.peers": (*CORE, "services.access"),
-    "services.simulated": (*CORE, *SHELL, "services.peers", "services.supervisor"),
+    "services.simulated": (*CORE, *SHELL, "services.client", "services.peers", "services.supervisor"),
     "services.virtual": ("services",),
     "services.demo": ("services",),
     "services.pytest_plugin": ("services",),

@@ -20,9 +20,8 @@ CONFIG = Path(__file__).parents[1] / "config"
 @pytest.fixture
 def flat(tmp_path: Path) -> Iterator[VirtualApartment]:
     config = Path(shutil.copytree(CONFIG, tmp_path / "config")) / "simulated.yaml"
-    text = config.read_text(encoding="utf-8").replace("bridge:\n", "bridge:\n  simulated: true\n")
-    config.write_text(text, encoding="utf-8")
-    with VirtualApartment(config, {"APARTMENT_DATABASE": f"sqlite:///{tmp_path}/bus.db"}) as flat:
+    environment = {"APARTMENT_DATABASE": f"sqlite:///{tmp_path}/bus.db", "APARTMENT_WITHOUT_ROS": "true"}
+    with VirtualApartment(config, environment) as flat:
         assert flat.until(lambda: _status(flat) == "online", 30.0)
         yield flat
 

@@ -1,0 +1,99 @@
+"""The README cannot go stale: its commands are run, its example is a test, and the paths that it names exist."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from services.simulated import Simulated
+
+pytest_plugins = ["pytester"]
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SHELL = [
+    line.partition(" # ")[0].strip()
+    for block in re.findall(r"```sh\n(.*?)```", README, re.S)
+    for line in block.splitlines()
+]
+LONG = ("apartment run", "mosquitto_sub", "rostopic echo")  # they go on until somebody ends them
+
+
+def test_the_make_commands_of_the_readme_exist() -> None:
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+    wanted = {line.split()[1] for line in SHELL if line.startswith("make ")} | set(
+        re.findall(r"`make ([a-z]+)", README)
+    )
+    assert {"demo", "test"} <= wanted <= targets
+
+
+def test_the_paths_of_the_readme_exist() -> None:
+    named = re.findall(r"`((?:services|config|mosquitto)/[\w/.<>-]*)`", README)
+    assert named
+    for path in named:
+        assert list(ROOT.glob(path.replace("<service>", "*"))), path
+
+
+@pytest.mark.parametrize(
+    "line", [line for line in SHELL if line.startswith("apartment ") and not line.startswith(LONG)]
+)
+def test_a_command_of_the_readme_does_what_it_says(line: str, simulated_apartment: Simulated) -> None:
+    environment = {**os.environ, **simulated_apartment.parts.environment}
+    words = [sys.executable, "-m", "services", *shlex.split(line)[1:]]
+    words = [str(simulated_apartment.config) if word == "config/simulated.yaml" else word for word in words]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=240, cwd=ROOT)
+    assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+    assert done.stdout.strip()
+
+
+def test_the_example_test_of_the_readme_runs(pytester: pytest.Pytester, simulated_apartment: Simulated) -> None:
+    """In a process and a folder of its own, as a lab would; against the apartment that runs already."""
+    example = re.search(r"```python\n(.*?)```", README, re.S)
+    assert example is not None
+    pytester.makepyfile(example[1])
+    result = pytester.runpytest_subprocess("-q", "-p", "no:cacheprovider", timeout=300)
+    result.assert_outcomes(passed=example[1].count("def test_"))
+
+
+@pytest.mark.parametrize(
+    "command", ["run", "serve", "simulate", "demo", "check", "topics", "status", "order", "scan", "history"]
+)
+def test_every_command_has_help_with_an_example(command: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "services", command, "--help"], capture_output=True, text=True, timeout=60,
+        env={**os.environ, "COLUMNS": "200"},
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert f"Example: apartment {command}" in done.stdout
+
+
+SIMULATED = ["--config", "config/simulated.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["nonsense"], 2),
+        (["check", "--config", "nowhere.yaml"], 2),
+        (["run", "nobody", *SIMULATED], 2),
+        (["history", "Never_Stored", *SIMULATED], 1),
+        (["order", "ip1", "Goto", "Nowhere", *SIMULATED], 1),
+    ],
+)
+def test_exit_codes_tell_what_went_wrong(words: list[str], code: int, simulated_apartment: Simulated) -> None:
+    environment = {**os.environ, **simulated_apartment.parts.environment}
+    done = subprocess.run(
+        [sys.executable, "-m", "services", *words],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=ROOT,
+    )
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
