@@ -34,6 +34,7 @@ class Parts:
     database: mariadb.Server | None = None
     ros: ros.Master | None = None
     broker: ExitStack = field(default_factory=ExitStack)
+    broker_pid: int = 0
 
     @property
     def broker_port(self) -> int:
@@ -123,8 +124,10 @@ def _start_broker(stack: ExitStack, parts: Parts, real: bool) -> None:
 
 def start_mosquitto(parts: Parts) -> None:
     """Starts it, or starts it again after `parts.broker.close()`: same folder, port, accounts."""
-    broker = mosquitto.private(parts.folder / "mosquitto", port=parts.broker_port, anonymous=True)
-    for account, password in parts.broker.enter_context(broker).passwords.items():
+    started = mosquitto.private(parts.folder / "mosquitto", port=parts.broker_port, anonymous=True)
+    broker = parts.broker.enter_context(started)
+    parts.broker_pid = broker.pid
+    for account, password in broker.passwords.items():
         parts.environment[f"BUS_{account.replace('-', '_').upper()}_PASSWORD"] = password
 
 

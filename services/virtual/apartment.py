@@ -18,7 +18,7 @@ from services.camera.service import CameraService
 from services.camera.start import eye
 from services.client import FINAL, Client
 from services.config import Instance, load
-from services.payloads import OrderResult
+from services.payloads import OrderResult, PositionSet
 from services.runner import Post, Runner
 from services.simulators.camera.profiles import PROFILES
 from services.simulators.camera.program import Inside, inside
@@ -67,16 +67,24 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
 
     def order(self, camera_name: str, key: str, value: str = "", seconds: float = 600.0) -> OrderResult | None:
         """Gives a camera an order and lets time pass until its end; None when it has none."""
+        return self._ordered(camera_name, key, f"camera/{camera_name}/order/{key}", value, seconds)
+
+    def look(self, camera_name: str, seconds: float = 600.0, **axes: float) -> OrderResult | None:
+        """Sends a camera to readings (pan, tilt, zoom) and lets time pass until it is there; None when it never is."""
+        topic = f"camera/{camera_name}/position/set"
+        return self._ordered(camera_name, "Position", topic, PositionSet(**axes).model_dump_json(), seconds)
+
+    def _ordered(self, camera_name: str, key: str, topic: str, payload: str, seconds: float) -> OrderResult | None:
         self.client.forget()
-        topic = CAMERA_ORDER_RESULT.name(cam=camera_name)
+        answer = CAMERA_ORDER_RESULT.name(cam=camera_name)
         ended: list[OrderResult] = []
 
         def over() -> bool:
-            answers = [read(message, self.now).payload for message in self.client.pump() if message.topic == topic]
-            ended.extend(answer for answer in answers if answer.state in FINAL and answer.key == key)
+            answers = [read(message, self.now).payload for message in self.client.pump() if message.topic == answer]
+            ended.extend(one for one in answers if one.state in FINAL and one.key == key)
             return bool(ended)
 
-        self.client.say(f"camera/{camera_name}/order/{key}", value)
+        self.client.say(topic, payload)
         return ended[0] if self.until(over, seconds) else None
 
     def _settle(self) -> None:

@@ -1,0 +1,119 @@
+"""`make soak`: the trials of the tests with more turns. `PART`, `N` (0: as many as fit into ten minutes), `SEED`.
+
+Prints its figures, and the seed that repeats them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import shutil
+import signal
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from services.simulated import CONFIG, Simulated, parts_of, services_of
+from services.virtual import VirtualApartment
+from tests import trials
+
+LONGEST_S = 600.0
+Turn = Callable[[random.Random], float]
+
+
+@contextmanager
+def real(trial: Callable[[Simulated, random.Random], float]) -> Iterator[Turn]:
+    """Turns on real parts, one apartment for all."""
+    with (
+        tempfile.TemporaryDirectory() as name,
+        parts_of(Path(name) / "parts", real=True) as parts,
+        services_of(Path(name) / "services", parts) as flat,
+    ):
+        yield lambda rng: trial(flat, rng)
+
+
+@contextmanager
+def virtual(trial: Callable[[VirtualApartment, random.Random], float]) -> Iterator[Turn]:
+    """Turns in virtual time, one apartment for all."""
+    with tempfile.TemporaryDirectory() as name:
+        config = Path(shutil.copytree(CONFIG, Path(name) / "config")) / "simulated.yaml"
+        own = {"APARTMENT_DATABASE": f"sqlite:///{name}/bus.db", "APARTMENT_WITHOUT_ROS": "true"}
+        with VirtualApartment(config, {**os.environ, **own}) as flat:
+            assert flat.until(lambda: "camera/ip1/places" in flat.hub.retained, 30.0)
+            yield lambda rng: trial(flat, rng)
+
+
+def move(flat: VirtualApartment, rng: random.Random) -> float:
+    """A goal anywhere in reach; the seconds it took, in virtual time."""
+    pan, tilt = rng.choice([rng.uniform(0, 178), rng.uniform(187, 359.9)]), rng.uniform(0, 90)
+    began = flat.now
+    result = flat.look("ip1", pan=round(pan, 1), tilt=round(tilt, 1))
+    assert result is not None
+    assert result.state == "done", result
+    return flat.now - began
+
+
+def scan(flat: VirtualApartment, rng: random.Random) -> float:
+    """A scan from wherever the camera looks; the seconds it took, in virtual time."""
+    move(flat, rng)
+    began = flat.now
+    result = flat.order("ip1", "Scan", "ON")
+    assert result is not None
+    assert result.state == "done", result
+    assert any(message.topic == "camera/ip1/scan/result" for message in flat.client.seen)
+    return flat.now - began
+
+
+PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
+    "kills": (lambda: real(lambda flat, rng: trials.kill(flat, rng.choice(trials.BUS_SERVICES))), 40, "s until online"),
+    "broker": (
+        lambda: real(lambda flat, rng: trials.restart_broker(flat, rng.choice([signal.SIGTERM, signal.SIGKILL]))),
+        20,
+        "s until all are online",
+    ),
+    "rubbish": (
+        lambda: real(lambda flat, rng: sum(trials.rubbish(flat, 10_000, rng.randrange(10**6)).values())),
+        5,
+        "bad messages counted",
+    ),
+    "moves": (lambda: virtual(move), 200, "s, virtual"),
+    "scans": (lambda: virtual(scan), 50, "s, virtual"),
+}
+
+
+def run(part: str, turns: int, seed: int) -> list[float]:
+    """One part; ends early after LONGEST_S."""
+    start, usual, _ = PARTS[part]
+    rng, end, figures = random.Random(seed), time.monotonic() + LONGEST_S, []
+    with start() as turn:  # type: ignore[attr-defined]
+        for _ in range(turns or usual):
+            figures.append(turn(rng))
+            if time.monotonic() > end:
+                break
+    return figures
+
+
+def main() -> None:
+    """Runs the parts that are wanted and prints one table."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--part", default="all", choices=["all", *PARTS])
+    arguments.add_argument("--turns", type=int, default=0)
+    arguments.add_argument("--seed", type=int, default=1)
+    given = arguments.parse_args()
+    table = Table("part", "turns", "min", "median", "max", "", "seed")
+    for part in PARTS if given.part == "all" else [given.part]:
+        figures = run(part, given.turns, given.seed)
+        row = (min(figures), statistics.median(figures), max(figures))
+        table.add_row(part, str(len(figures)), *(f"{figure:.2f}" for figure in row), PARTS[part][2], str(given.seed))
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,142 @@
+"""Trials of the whole apartment that the system test makes once and the soak many times.
+
+Each does something bad, asserts that everybody is well again, and returns the figure that people want to see.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import signal
+import time
+
+from services import peers, topics
+from services.client import Client, connected
+from services.simulated import Simulated, start_mosquitto
+
+BUS_SERVICES = ("camera-ip1", "bridge", "persistence", "simulated-home")
+
+
+def pids(flat: Simulated, without: str = "") -> dict[str, int]:
+    """The processes as they are, all but one."""
+    children = flat.supervisor.children.values()
+    return {child.name: child.process.pid for child in children if child.process and child.name != without}
+
+
+def settled(flat: Simulated, name: str) -> int:
+    """The pid of a service that runs and is ready."""
+    child = flat.supervisor.children[name]
+    peers.wait_until(lambda: child.process is not None and child.ready is not None, f"{name} to be ready")
+    assert child.process is not None
+    return child.process.pid
+
+
+def kill(flat: Simulated, name: str) -> float:
+    """kill -9 of one service; seconds until it is online again. Nobody else may come or go."""
+    pid, others = settled(flat, name), pids(flat, name)
+    with connected(flat.apartment.bus, ["service/+/status"]) as bus:
+        bus.payload(f"service/{name}/status", lambda text: text == "online")
+        bus.forget()
+        os.kill(pid, signal.SIGKILL)
+        killed = time.monotonic()
+        for state in ("offline", "online"):
+            bus.until(lambda m, state=state: m.topic == f"service/{name}/status" and m.payload == state.encode(), 10.0)  # type: ignore[misc]
+        seconds = time.monotonic() - killed
+        noticed = {message.topic for message in bus.seen if not message.retain}
+    assert noticed == {f"service/{name}/status"}
+    assert pids(flat, name) == others
+    settled(flat, name)
+    return seconds
+
+
+def kill_camera(flat: Simulated) -> float:
+    """kill -9 of the simulated camera; seconds until its service has met it again."""
+    pid, others = settled(flat, "simulated-camera"), pids(flat, "simulated-camera")
+    with connected(flat.apartment.bus, ["camera/ip1/status"]) as bus:
+        bus.payload("camera/ip1/status", lambda status: status.state == "online")
+        bus.forget()
+        os.kill(pid, signal.SIGKILL)
+        killed = time.monotonic()
+        bus.payload("camera/ip1/status", lambda status: status.state == "offline", 20.0)
+        bus.payload("camera/ip1/status", lambda status: status.state == "online", 30.0)
+        seconds = time.monotonic() - killed
+    assert pids(flat, "simulated-camera") == others
+    settled(flat, "simulated-camera")
+    return seconds
+
+
+def restart_broker(flat: Simulated, how: signal.Signals) -> float:
+    """Ends the broker and starts it again; seconds until every service is online, subscribed and heard."""
+    before, parts = pids(flat), flat.parts
+    if how is signal.SIGKILL:
+        os.kill(parts.broker_pid, signal.SIGKILL)
+    parts.broker.close()
+    start_mosquitto(parts)
+    back = time.monotonic()
+    with connected(flat.apartment.bus, ["service/+/status", "home/Kitchen_Light/+", "camera/ip1/places"]) as bus:
+        for name in BUS_SERVICES:
+            bus.payload(f"service/{name}/status", lambda text: text == "online")
+        seconds = time.monotonic() - back
+        bus.payload("camera/ip1/places")
+        switch(bus)
+    assert pids(flat) == before
+    return seconds
+
+
+def switch(bus: Client) -> None:
+    """The kitchen light goes on and off: a command arrives, and its answer does."""
+    for state in ("ON", "OFF"):
+        bus.forget()
+        bus.say("home/Kitchen_Light/command", state)
+        bus.payload("home/Kitchen_Light/state", lambda text, state=state: text == state, 60.0)  # type: ignore[misc]
+
+
+def rubbish(flat: Simulated, count: int, seed: int) -> dict[str, float]:
+    """Messages of rubbish under the filters that people subscribe to; how many each service counted as bad."""
+    before, rng = pids(flat), random.Random(seed)
+    with connected(flat.apartment.bus, ["service/+/info", "home/Kitchen_Light/state"]) as bus:
+        counted = {name: counters(bus, name, 0)["bad"] for name in BUS_SERVICES}
+        for number in range(count):
+            bus.say(rubbish_topic(rng), rubbish_payload(rng), qos=number % 2)
+            if number % 500 == 0:
+                bus.forget()
+        switch(bus)
+        bad = {name: counters(bus, name, counted[name] + 1)["bad"] - counted[name] for name in BUS_SERVICES}
+    assert pids(flat) == before
+    return bad
+
+
+def counters(bus: Client, name: str, bad: float) -> dict[str, float]:
+    """What a service counts, once it has counted so many bad messages."""
+    return dict(bus.payload(f"service/{name}/info", lambda info: info.counters["bad"] >= bad, 60.0).counters)
+
+
+def rubbish_topic(rng: random.Random) -> str:
+    row = rng.choice([row for row in topics.TABLE if row.payload is not bytes])
+    levels = {"cam": rng.choice(["ip1", "ip2", "x" * 50]), "service": rng.choice(["nobody", "a-b"]), "component": "x/y",
+              "item": rng.choice(["Kitchen_Light", "Hall_Dimmer", "No_Such_Item", "Lamp_Color"]),
+              "key": rng.choice(["Goto", "Scan", "Nonsense"]), "marker": str(rng.randrange(2000))}  # fmt: skip
+    return re.sub(r"<(\w+)>", lambda m: levels[m[1]], row.pattern) + rng.choice(["", "", "", "/more", "é"])
+
+
+def rubbish_payload(rng: random.Random) -> bytes:
+    kind = rng.randrange(8)
+    if kind == 0:
+        return rng.randbytes(rng.randrange(200))
+    if kind == 1:
+        return b"[" * rng.randrange(1, 20_000)
+    if kind == 2:
+        return b'{"value":' * 500 + b"1" + b"}" * 500
+    if kind == 3:
+        return b"x" * (300_000 if rng.random() < 0.05 else 5000)
+    if kind == 4:
+        return b"\xff\xfe" + rng.randbytes(20)
+    if kind == 5:
+        return json.dumps(
+            {"value": {"targets": [rng.choice([-1, 1e308, "x", None])]}, "id": "x" * rng.choice([3, 300])}
+        ).encode()
+    if kind == 6:
+        return b"NaN"
+    return "".join(chr(rng.randrange(1, 0x2FF)) for _ in range(30)).encode()
