@@ -24,7 +24,7 @@ from services.process import SUPERVISED
 
 log = logging.getLogger(__name__)
 
-SETTLED_S = 10.0  # a service that lived so long starts again at once
+SETTLED_S = 3.0  # a service that lived so long starts again at once; one that crashes while starting waits
 BACKOFF_S = (0.2, 30.0)  # after a short life: first, longest; doubled each time
 READY_S = 60.0  # a small machine imports OpenCV for some seconds
 GRACE_S = 5.0  # between SIGTERM and SIGKILL

@@ -46,7 +46,6 @@ def virtual(trial: Callable[[VirtualApartment, random.Random], float]) -> Iterat
         config = Path(shutil.copytree(CONFIG, Path(name) / "config")) / "simulated.yaml"
         own = {"APARTMENT_DATABASE": f"sqlite:///{name}/bus.db", "APARTMENT_WITHOUT_ROS": "true"}
         with VirtualApartment(config, {**os.environ, **own}) as flat:
-            assert flat.until(lambda: "camera/ip1/places" in flat.hub.retained, 30.0)
             yield lambda rng: trial(flat, rng)
 
 

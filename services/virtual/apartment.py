@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from services import camera
 from services.aside import Aside
@@ -23,10 +23,11 @@ from services.runner import Post, Runner
 from services.simulators.camera.profiles import PROFILES
 from services.simulators.camera.program import Inside, inside
 from services.simulators.camera.settings import Config as CameraSimulator
-from services.topics import CAMERA_ORDER_RESULT, SERVICE_STATUS, read
+from services.topics import CAMERA_ORDER_RESULT, CAMERA_STATUS, SERVICE_STATUS, read
 from services.virtual.link import Lane, Link
 from services.virtual.wire import Wire
 
+READY_S = 60.0
 START = 1_768_000_000.0  # a January morning; only the simulated weather cares
 
 
@@ -46,6 +47,16 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()
+
+    def __enter__(self) -> Self:
+        """Lets time pass until every camera is online; TimeoutError after READY_S of it."""
+        if not self.until(lambda: all(map(self._online, self.apartment.cameras)), READY_S):
+            raise TimeoutError(f"the cameras are not online after {READY_S:.0f} s of virtual time")
+        return self
+
+    def _online(self, camera_name: str) -> bool:
+        said = self.hub.retained.get(CAMERA_STATUS.name(cam=camera_name))
+        return said is not None and read(said, self.now).payload.state == "online"
 
     def clock(self) -> float:
         """Seconds since 1970, here."""
