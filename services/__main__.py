@@ -21,7 +21,7 @@ from services.bus import Message
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult, stamp
-from services.supervisor import Supervisor, command
+from services.supervisor import Supervisor, commands, processes
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -39,28 +39,26 @@ err = Console(stderr=True, soft_wrap=True, highlight=False)
 def run(services: Annotated[list[str] | None, typer.Argument()] = None, config: Config = CONFIG) -> None:
     """Start services (all that the configuration has), one process each, and keep them running."""
     process.log_to_stderr()
-    apartment = load(config, tuple(services) if services else None)
-    names = _names(apartment, services)
-    supervisor = Supervisor({name: command(name, config.resolve()) for name in names})
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: supervisor.stop())
+    apartment = load(config, tuple(services) if services else None, deep=True)
+    supervisor = Supervisor(commands(processes(apartment, _names(apartment, services)), config.resolve()))
     broker = {"host": apartment.bus.host, "port": apartment.bus.port}
-    supervisor.run(lambda ready: _say(process.ready_line("run", {"broker": broker, "services": ready})))
+    with process.stop_signals(supervisor.stop):
+        supervisor.run(lambda ready: _say(process.ready_line("run", {"broker": broker, "services": ready})))
 
 
 @app.command(epilog="Example: apartment serve bridge")
-def serve(name: str, config: Config = CONFIG) -> None:
-    """Run one service in this process: what `run` and systemd start."""
+def serve(services: list[str], config: Config = CONFIG) -> None:
+    """Run services in this process, one mostly: what `run` and systemd start."""
     process.log_to_stderr()
-    apartment = load(config, (name,))
-    _names(apartment, [name])
-    process.serve(apartment, name, lambda addresses: _say(process.ready_line(name, addresses)))
+    apartment = load(config, tuple(services))
+    _names(apartment, services)
+    process.serve(apartment, services, lambda addresses: _say(process.ready_line("+".join(services), addresses)))
 
 
 @app.command(epilog="Example: apartment simulate camera --config config/simulated.yaml")
 def simulate(what: Annotated[str, typer.Argument(help="camera or home")], config: Config = CONFIG) -> None:
     """Run one simulator alone."""
-    serve(f"simulated-{what}", config)
+    serve([f"simulated-{what}"], config)
 
 
 @app.command(epilog="Example: apartment demo --once")
@@ -78,8 +76,8 @@ def demo(
 
 @app.command(epilog="Example: apartment check --config config/apartment.yaml")
 def check(config: Config = CONFIG) -> None:
-    """Check a configuration: lists every fault with file and line."""
-    apartment = load(config)
+    """Check a configuration and every file that it names: lists every fault with file and line."""
+    apartment = load(config, deep=True)
     cameras = ", ".join(apartment.cameras) or "none"
     out.print(f"{config}: good. Services: {', '.join(apartment.instances)}. Cameras: {cameras}.")
 

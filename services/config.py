@@ -1,7 +1,7 @@
 """Reads the configuration file into each service's Config, and tells all faults at once, with file and line.
 
-The top of the file: `bus`, `state`, `home` (a file), `default_camera`, and a section for each service, named in
-`registry.py`. What a setting means stands at the Config above the code that uses it.
+The top of the file: `bus`, `state`, `home` (a file), `default_camera`, `grouped`, and a section for each service,
+named in `registry.py`. What a setting means stands at the Config above the code that uses it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from services.registry import REGISTRY, Row
 from services.section import Section
 
 M = TypeVar("M", bound=BaseModel)
-TOP = ("bus", "state", "home", "default_camera")
+TOP = ("bus", "state", "home", "default_camera", "grouped")
 INJECTED = ("name", "home", "cameras", "folder")  # see `section.py`
 
 
@@ -55,6 +55,19 @@ class Instance:
     config: Section
 
 
+def check_files(instances: dict[str, Instance]) -> list[str]:
+    """The faults of the files that the services' own settings name (rules, places, the world)."""
+    faults: list[str] = []
+    for instance in instances.values():
+        check = getattr(importlib.import_module(instance.row.module), "check", None)
+        try:
+            if check is not None:
+                check(instance.config)
+        except ConfigError as error:
+            faults += error.faults
+    return faults
+
+
 @dataclass(frozen=True)
 class Apartment:
     """The whole configuration, checked."""
@@ -64,6 +77,7 @@ class Apartment:
     home: Home
     state: Path
     cameras: tuple[str, ...]
+    grouped: bool = False
     instances: dict[str, Instance] = field(default_factory=dict)
 
 
@@ -74,10 +88,20 @@ class Top(Section):
     state: Path | None = None
     home: Path
     default_camera: str | None = None
+    grouped: bool = False  # light services share a process: for a small machine
 
 
-def load(file: Path, only: tuple[str, ...] | None = None, environment: Mapping[str, str] = os.environ) -> Apartment:
-    """Reads and checks; ConfigError with every fault. `only`: services to run; the others' secrets may be absent."""
+def load(
+    file: Path,
+    only: tuple[str, ...] | None = None,
+    environment: Mapping[str, str] = os.environ,
+    *,
+    deep: bool = False,
+) -> Apartment:
+    """Reads and checks; ConfigError with every fault.
+
+    `only`: services to run; the others' secrets may be absent. `deep`: the files that services' settings name too.
+    """
     secret = secret_store.lookup(environment)
     source = document.read(file, secret)
     raw = source.value if isinstance(source.value, dict) else {}
@@ -88,12 +112,11 @@ def load(file: Path, only: tuple[str, ...] | None = None, environment: Mapping[s
     cameras = _cameras(raw, source)
     given = {"home": home, "cameras": cameras, "folder": file.parent}
     _unknown_sections(raw, source)
-    instances = list(_instances(raw, source, cameras, given))
-    faults = [*_wanted(source.faults, only), *home_faults]
+    instances = {one.name: one for one in _instances(raw, source, cameras, given)}
+    faults = [*_wanted(source.faults, only), *home_faults, *(check_files(instances) if deep else [])]
     if faults or top is None or home is None:
         raise ConfigError(sorted(dict.fromkeys(faults), key=_by_place))
-    by_name = {instance.name: instance for instance in instances}
-    return Apartment(file, top.bus, home, _state_folder(top, file, environment), cameras, by_name)
+    return Apartment(file, top.bus, home, _state_folder(top, file, environment), cameras, top.grouped, instances)
 
 
 def _by_place(fault: str) -> tuple[str, int]:
@@ -168,7 +191,7 @@ def _instances(
         for camera in cameras if "<cam>" in row.name else ("",):
             section = tuple(part.replace("<cam>", camera) for part in row.section)
             settings = _at(raw, section)
-            if settings is None and not (row.default or _at(raw, section[:-1], section[-1])):
+            if settings is None and not _at(raw, section[:-1], section[-1]):
                 continue
             name = row.name.replace("<cam>", camera)
             config = _config(row, settings or {}, source, section, {**given, "name": camera or name})

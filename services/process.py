@@ -1,4 +1,4 @@
-"""One service in this process: its bus, its turns until a signal, its log, its READY line.
+"""The services of this process, one mostly: bus, turns until a signal, log, READY line.
 
 Not here: starting processes again, that is `supervisor.py`; what a turn is, that is `runner.py`.
 """
@@ -15,7 +15,8 @@ import ssl
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from typing import Any
 
@@ -30,6 +31,7 @@ from services.topics import SERVICE_STATUS
 LONGEST_WAIT_S = 1.0
 SUPERVISED = "APARTMENT_SUPERVISED"  # set by the supervisor: end when it ends
 Ready = Callable[[dict[str, Any]], None]
+OneReady = Callable[[str, dict[str, Any]], None]
 
 
 def log_to_stderr(level: int = logging.INFO) -> None:
@@ -64,26 +66,45 @@ def tls_context(tls: Tls) -> ssl.SSLContext:
     return context
 
 
-def serve(apartment: Apartment, name: str, ready: Ready) -> None:
-    """Runs one service until SIGTERM or SIGINT. A bug in it comes out of here as it is."""
-    instance = apartment.instances[name]
+def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
+    """Runs services until SIGTERM or SIGINT, each in a thread of its own; a bug in one ends all and comes out as it is.
+
+    `ready` is told once, when the last of them has its connection.
+    """
     if os.environ.get(SUPERVISED):
         _end_with_parent()
-    with _stop_signal() as stopping:
-        if instance.row.on_bus:
-            _on_bus(apartment, instance, stopping, ready)
-        else:
-            _off_bus(instance, stopping, ready)
+    addresses: dict[str, Any] = {}
+
+    def one_is_ready(name: str, own: dict[str, Any]) -> None:
+        addresses[name] = own
+        if len(addresses) == len(names):
+            ready(addresses[name] if len(names) == 1 else {"services": addresses})
+
+    stopping = threading.Event()
+    with stop_signals(stopping.set), ThreadPoolExecutor(len(names)) as pool:
+        instances = [apartment.instances[name] for name in names]
+        futures = [pool.submit(_one, apartment, instance, stopping, one_is_ready) for instance in instances]
+        wait(futures, return_when=FIRST_COMPLETED)
+        stopping.set()
+        for future in futures:
+            future.result()
 
 
-def _off_bus(instance: Instance, stopping: threading.Event, ready: Ready) -> None:
+def _one(apartment: Apartment, instance: Instance, stopping: threading.Event, ready: OneReady) -> None:
+    if instance.row.on_bus:
+        _on_bus(apartment, instance, stopping, ready)
+    else:
+        _off_bus(instance, stopping, ready)
+
+
+def _off_bus(instance: Instance, stopping: threading.Event, ready: OneReady) -> None:
     """A program of its own, such as the simulated camera: it answers by itself."""
     with importlib.import_module(instance.row.module).start(instance.config) as program:
-        ready(dict(program.addresses))
+        ready(instance.name, dict(program.addresses))
         stopping.wait()
 
 
-def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event, ready: Ready) -> None:
+def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event, ready: OneReady) -> None:
     row, name = instance.row, instance.name
     bus = MqttBus(
         address(apartment.bus, name, name, protocol=row.protocol, durable=row.durable),
@@ -94,7 +115,7 @@ def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event,
     try:
         with importlib.import_module(row.module).start(instance.config, bus.post) as service:
             runner = Runner(name, service, bus, time.time, Aside(apartment.state / name / "aside"))
-            _turns(runner, stopping, lambda: ready(dict(getattr(service, "addresses", {}))))
+            _turns(runner, stopping, lambda: ready(name, dict(getattr(service, "addresses", {}))))
     finally:
         bus.close()
 
@@ -115,12 +136,20 @@ def _turns(runner: Runner, stopping: threading.Event, ready: Callable[[], None])
 
 
 @contextmanager
-def _stop_signal() -> Iterator[threading.Event]:
-    """An event that SIGTERM and SIGINT set."""
-    stopping = threading.Event()
+def stop_signals(stop: Callable[[], None]) -> Iterator[None]:
+    """Calls `stop` at SIGTERM and SIGINT; after the latter the block ends with KeyboardInterrupt, once it is done."""
+    interrupted = False
+
+    def told(number: int, _frame: object) -> None:
+        nonlocal interrupted
+        interrupted = number == signal.SIGINT
+        stop()
+
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stopping.set())
-    yield stopping
+        signal.signal(number, told)
+    yield
+    if interrupted:
+        raise KeyboardInterrupt
 
 
 def _end_with_parent() -> None:

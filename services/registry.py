@@ -15,7 +15,8 @@ class Row:
     """One service (or one per camera).
 
     `section` is where its settings stand in the configuration file; without that section it does not run.
-    `group`: services of one group may share a process. `durable`: the broker keeps its messages while it is away.
+    `group`: services of one group share a process where the configuration says `grouped`.
+    `durable`: the broker keeps its messages while it is away.
     `protocol`: 5, or 4 for MQTT 3.1.1, which costs half the time per message.
     """
 
@@ -28,7 +29,6 @@ class Row:
     protocol: Literal[4, 5] = 5
     on_bus: bool = True
     plays: str = ""  # the role at the broker that it has besides its own
-    default: bool = False  # runs even when the configuration has no section for it
 
 
 REGISTRY: tuple[Row, ...] = (
@@ -44,6 +44,7 @@ REGISTRY: tuple[Row, ...] = (
         "services.simulators.home",
         ("simulators", "home"),
         "lights, doors and sensors that answer as OpenHAB would",
+        group="light",
         plays="openhab",
     ),
     Row(
@@ -51,9 +52,10 @@ REGISTRY: tuple[Row, ...] = (
         "services.persistence",
         ("persistence",),
         "writes what happens to the database",
+        group="light",
         durable=True,
         protocol=4,
     ),
     Row("camera-<cam>", "services.camera", ("cameras", "<cam>"), "drives one camera: places, orders, scans"),
-    Row("bridge", "services.bridge", ("bridge",), "maps the bus to ROS 1 topics and back"),
+    Row("bridge", "services.bridge", ("bridge",), "maps the bus to ROS 1 topics and back", group="light"),
 )

@@ -17,7 +17,7 @@ from typing import Any
 from services.client import connected
 from services.config import Apartment, load
 from services.peers import Missing, answers, embedded, free_port, mariadb, mosquitto, ros
-from services.supervisor import READY_S, Supervisor, command, in_background
+from services.supervisor import READY_S, Supervisor, commands, in_background, processes
 from services.topics import CAMERA_STATUS
 
 CONFIG = Path(__file__).parents[1] / "config"
@@ -101,8 +101,7 @@ def services_of(folder: Path, parts: Parts, without: Collection[str] = ()) -> It
     shutil.copytree(CONFIG, config.parent)  # saved places and the like are not to change the repository
     apartment = load(config, environment={**os.environ, **parts.environment})
     names = [name for name in apartment.instances if name not in without]
-    commands = {name: command(name, config) for name in names}
-    supervisor = Supervisor(commands, parts.environment, folder / "services.log")
+    supervisor = Supervisor(commands(processes(apartment, names), config), parts.environment, folder / "services.log")
     with in_background(supervisor) as ready:
         _wait_for_cameras(apartment, names)
         yield Simulated(folder, config, apartment, parts, supervisor, ready)

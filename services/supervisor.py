@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from services.config import Apartment
 from services.process import SUPERVISED
 
 log = logging.getLogger(__name__)
@@ -44,9 +45,19 @@ class Child:
     restarts: int = field(default=-1)
 
 
-def command(name: str, config: Path) -> list[str]:
-    """How one service is started."""
-    return [sys.executable, "-m", "services", "serve", name, "--config", str(config)]
+def processes(apartment: Apartment, names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Which services share a process: each has its own, but where the configuration says `grouped`."""
+    shared: dict[str, tuple[str, ...]] = {}
+    for name in names:
+        group = apartment.instances[name].row.group if apartment.grouped else ""
+        shared[group or f"/{name}"] = (*shared.get(group or f"/{name}", ()), name)
+    return list(shared.values())
+
+
+def commands(groups: Sequence[tuple[str, ...]], config: Path) -> dict[str, list[str]]:
+    """How each process is started."""
+    python = [sys.executable, "-m", "services", "serve"]
+    return {"+".join(group): [*python, *group, "--config", str(config)] for group in groups}
 
 
 class Supervisor:

@@ -46,9 +46,9 @@ def main() -> None:
     port, state = int(sys.argv[1]), Path(sys.argv[2])
     process.log_to_stderr()
     instance = Instance(NAME, ROW, Config())
-    apartment = Apartment(Path("-"), BusSettings(port=port), Home(items={}), state, (), {NAME: instance})
+    apartment = Apartment(Path("-"), BusSettings(port=port), Home(items={}), state, (), instances={NAME: instance})
     process.serve(
-        apartment, NAME, lambda ready: sys.stdout.write(process.ready_line(NAME, ready) + "\n") and sys.stdout.flush()
+        apartment, [NAME], lambda ready: sys.stdout.write(process.ready_line(NAME, ready) + "\n") and sys.stdout.flush()
     )
 
 

@@ -58,7 +58,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.dashboard": SERVICE,
     "services.simulators": (*SERVICE, "services.vision"),
     "services.process": (*CORE, *BUSES, *SHELL),
-    "services.supervisor": ("services.process",),
+    "services.supervisor": ("services.process", "services.config"),
     "services.client": (*CORE, *BUSES, *SHELL),
     "services.peers": (*CORE, "services.access"),
     "services.simulated": (*CORE, *SHELL, "services.client", "services.peers", "services.supervisor"),

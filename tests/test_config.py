@@ -33,7 +33,7 @@ def spoil(file: Path, old: str, new: str, *, first: bool = False) -> int:
 
 def faults(file: Path) -> list[str]:
     with pytest.raises(ConfigError) as caught:
-        load(file)
+        load(file, deep=True)
     return list(caught.value.faults)
 
 
@@ -74,6 +74,21 @@ def test_six_faults_of_six_kinds_are_all_told_with_file_and_line(folder: Path) -
     assert "default_camera: expected one of the cameras (ip1), got 'ip7'" in by_place[places[3]]
     assert "expected ${NOT_ANYWHERE} in the environment" in by_place[places[4]]
     assert "items.Kitchen-Light: expected a name of letters, digits and _" in by_place[places[5]]
+
+
+def test_the_files_that_services_name_are_checked_too(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    files = [folder / name for name in ("bridge.yaml", "ip1/ost.yaml", "ip1/preset_position.yaml", "world.yaml")]
+    lines = [
+        spoil(files[0], "direction: to_ros", "direction: up", first=True),
+        spoil(files[1], "image_width: 1152", "image_width: wide"),
+        spoil(files[2], "Kitchen: [", "Kitchen: [far, "),
+        spoil(files[3], "resolution: 0.05", "resolution: -1"),
+        spoil(file, "  port: ${APARTMENT_BROKER_PORT:-1883}", "  port: many"),
+    ]
+    told = faults(file)
+    for spoilt, line in zip([*files, file], lines, strict=True):
+        assert any(fault.startswith(f"{spoilt}:") for fault in told), f"{spoilt}:{line} not in {told}"
 
 
 def test_check_lists_every_fault_and_ends_with_two(folder: Path) -> None:

@@ -6,6 +6,7 @@ That is: only items of group ROS, only what their types allow, REFRESH, and the 
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -166,11 +167,20 @@ class Bridge:
         return self._home.ros_items[name]
 
 
+def check(config: Config) -> None:
+    """ConfigError with every fault of the rules; their types are checked where ROS is installed."""
+    known = _types(config) if importlib.util.find_spec("genpy") else rulebook.unchecked
+    rulebook.load(config.folder / config.rules, config.cameras, known)
+
+
+def _types(config: Config) -> rulebook.Check:
+    return rulebook.unchecked if config.simulated else messages.faults
+
+
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[Bridge]:
     """The service with its node; ConfigError when the rules cannot be used, or ROS is not installed."""
-    check = rulebook.unchecked if config.simulated else messages.faults
-    rules = rulebook.load(config.folder / config.rules, config.cameras, check)
+    rules = rulebook.load(config.folder / config.rules, config.cameras, _types(config))
     with closing(_node(config, rules, post)) as node:
         yield Bridge(config.home, rules, node)
 

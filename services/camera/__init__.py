@@ -3,6 +3,6 @@ orders, and where in the apartment the markers are that a scan has found. The on
 """
 
 from services.camera.settings import Config
-from services.camera.start import start
+from services.camera.start import check, start
 
-__all__ = ["Config", "start"]
+__all__ = ["Config", "check", "start"]

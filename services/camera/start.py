@@ -9,6 +9,7 @@ from services import document
 from services.camera.address import Address
 from services.camera.analysis import Pool
 from services.camera.device import Device
+from services.camera.places import Places
 from services.camera.service import CameraService
 from services.camera.settings import Config
 from services.camera.sightings import Eye
@@ -34,6 +35,18 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     finally:
         device.close()
         watchdog.close()
+
+
+def check(config: Config) -> None:
+    """ConfigError with every fault of the files that the configuration names: calibration and places."""
+    faults: list[str] = []
+    for read in (lambda: eye(config), lambda: Places(config.folder / config.places)):
+        try:
+            read()
+        except ConfigError as error:
+            faults += error.faults
+    if faults:
+        raise ConfigError(faults)
 
 
 def eye(config: Config) -> Eye:

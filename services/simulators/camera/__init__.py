@@ -13,11 +13,17 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 from services.simulators.camera.settings import Config
+from services.simulators.world import load
 
 if TYPE_CHECKING:
     from services.simulators.camera.program import Simulated
 
-__all__ = ["Config", "start"]
+__all__ = ["Config", "check", "start"]
+
+
+def check(config: Config) -> None:
+    """ConfigError with every fault of the world's file."""
+    load(config.folder / config.world)
 
 
 def start(config: Config, *, clock: Callable[[], float] = time.time) -> AbstractContextManager[Simulated]:
