@@ -29,6 +29,7 @@ from services.runner import Runner
 from services.topics import SERVICE_STATUS
 
 LONGEST_WAIT_S = 1.0
+SIGNAL_S = 0.5  # a signal that comes while Python is about to wait is seen at the end of the wait only
 SUPERVISED = "APARTMENT_SUPERVISED"  # set by the supervisor: end when it ends
 Ready = Callable[[dict[str, Any]], None]
 OneReady = Callable[[str, dict[str, Any]], None]
@@ -84,7 +85,8 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
     with stop_signals(stopping.set), ThreadPoolExecutor(len(names)) as pool:
         instances = [apartment.instances[name] for name in names]
         futures = [pool.submit(_one, apartment, instance, stopping, one_is_ready) for instance in instances]
-        wait(futures, return_when=FIRST_COMPLETED)
+        while not wait(futures, timeout=SIGNAL_S, return_when=FIRST_COMPLETED).done:
+            pass
         stopping.set()
         for future in futures:
             future.result()

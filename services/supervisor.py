@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from services.config import Apartment
-from services.process import SUPERVISED
+from services.process import SIGNAL_S, SUPERVISED
 
 log = logging.getLogger(__name__)
 
@@ -118,7 +118,7 @@ class Supervisor:
 
     def _until_next_start(self) -> float:
         waits = [child.start_at - time.monotonic() for child in self.children.values() if child.start_at is not None]
-        return max(0.0, min(waits, default=3600.0))
+        return max(0.0, min([*waits, SIGNAL_S]))
 
     def _listen(self, timeout: float) -> None:
         try:
