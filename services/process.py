@@ -15,6 +15,7 @@ import ssl
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager
@@ -29,7 +30,7 @@ from services.runner import Runner
 from services.topics import SERVICE_STATUS
 
 LONGEST_WAIT_S = 1.0
-SIGNAL_S = 0.5  # a signal that comes while Python is about to wait is seen at the end of the wait only
+SIGNAL_S = 0.2  # a signal that comes while Python is about to wait is seen at the end of the wait only
 SUPERVISED = "APARTMENT_SUPERVISED"  # set by the supervisor: end when it ends
 Ready = Callable[[dict[str, Any]], None]
 OneReady = Callable[[str, dict[str, Any]], None]
@@ -81,11 +82,11 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
         if len(addresses) == len(names):
             ready(addresses[name] if len(names) == 1 else {"services": addresses})
 
-    stopping = threading.Event()
-    with stop_signals(stopping.set), ThreadPoolExecutor(len(names)) as pool:
+    stopping, asked = threading.Event(), deque[bool]()
+    with stop_signals(lambda: asked.append(True)), ThreadPoolExecutor(len(names)) as pool:
         instances = [apartment.instances[name] for name in names]
         futures = [pool.submit(_one, apartment, instance, stopping, one_is_ready) for instance in instances]
-        while not wait(futures, timeout=SIGNAL_S, return_when=FIRST_COMPLETED).done:
+        while not asked and not wait(futures, timeout=SIGNAL_S, return_when=FIRST_COMPLETED).done:
             pass
         stopping.set()
         for future in futures:
@@ -139,12 +140,16 @@ def _turns(runner: Runner, stopping: threading.Event, ready: Callable[[], None])
 
 @contextmanager
 def stop_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Calls `stop` at SIGTERM and SIGINT; after the latter the block ends with KeyboardInterrupt, once it is done."""
+    """Calls `stop` at SIGTERM and SIGINT; after the latter the block ends with KeyboardInterrupt, once it is done.
+
+    `stop` takes no lock: the next signal interrupts it (a dying parent sends one for each of its threads), and the
+    lock of an Event would wait for itself.
+    """
     interrupted = False
 
     def told(number: int, _frame: object) -> None:
         nonlocal interrupted
-        interrupted = number == signal.SIGINT
+        interrupted = interrupted or number == signal.SIGINT
         stop()
 
     for number in (signal.SIGTERM, signal.SIGINT):
