@@ -66,7 +66,10 @@ def _show_services(out: Console, running: Simulated) -> None:
     out.print(f"Their log: {running.log}", style="dim")
     port = running.apartment.bus.port
     out.print(f"Try it: mosquitto_pub -p {port} -t home/Kitchen_Light/command -m ON", style="dim")
+    out.print(f"        mosquitto_pub -p {port} -t camera/ip1/order/Goto -m Kitchen", style="dim")
     out.print(f"        mosquitto_sub -p {port} -v -t 'home/#' -t 'camera/#'", style="dim")
+    if running.parts.ros:
+        out.print(f"        ROS_MASTER_URI={running.parts.ros.uri} rostopic echo /iot_updates", style="dim")
 
 
 def _story(out: Console, running: Simulated, *, once: bool) -> bool:
