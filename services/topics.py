@@ -202,16 +202,30 @@ def find(topic: str) -> tuple[Topic, dict[str, str]]:
     raise BadMessage(f"no topic like {topic[:200]!r}")
 
 
+class LateCommand(BadMessage):
+    """A command that is retained or too old; `read` is what it wanted, for an answer."""
+
+    def __init__(self, read: Read, why: str) -> None:
+        super().__init__(f"{read.message.topic}: refused, {why}")
+        self.read = read
+
+
 def read(message: Message, now: float) -> Read:
-    """From untrusted bytes to the payload's type; BadMessage says what was expected and what came."""
-    row, levels = find(message.topic)
-    if row.kind is Kind.COMMAND:
+    """From untrusted bytes to the payload's type; BadMessage says what was expected and what came.
+
+    A command that is retained or older than STALE_AFTER_S is a LateCommand.
+    """
+    known = _read(message)
+    if known.topic.kind is Kind.COMMAND:
         if message.retain:
-            raise BadMessage(f"{message.topic}: a retained command is refused")
+            raise LateCommand(known, "a retained command")
         if now - message.received > STALE_AFTER_S:
-            raise BadMessage(
-                f"{message.topic}: refused, {now - message.received:.1f} s old (limit {STALE_AFTER_S:.0f})"
-            )
+            raise LateCommand(known, f"{now - message.received:.1f} s old (limit {STALE_AFTER_S:.0f})")
+    return known
+
+
+def _read(message: Message) -> Read:
+    row, levels = find(message.topic)
     limit = BLOB_LIMIT if row.payload is bytes else TEXT_LIMIT
     if len(message.payload) > limit:
         raise BadMessage(f"{message.topic}: {len(message.payload)} bytes, at most {limit} allowed")

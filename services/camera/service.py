@@ -29,6 +29,7 @@ from services.camera.requests import GetPicture, Identify, Identity, Picture, Ra
 from services.camera.scanner import Scanner
 from services.camera.settings import Config
 from services.camera.sightings import Eye
+from services.errors import BadMessage
 from services.payloads import Order, OrderState, PositionSet
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
@@ -67,8 +68,26 @@ class CameraService:
         elif message.topic == ANALYSED and isinstance(message.value, Analysed):
             self.scanner.take(message.value)
         else:
-            self._read(topics.read(message, now), now)
+            try:
+                read = topics.read(message, now)
+            except BadMessage as error:
+                self._refuse(message, error)
+                raise
+            self._read(read, now)
         return self._flush()
+
+    def _refuse(self, message: Message, error: BadMessage) -> None:
+        """An order that cannot be taken is answered all the same, with its own id where it could be read."""
+        row, levels = topics.find(message.topic)
+        wanted = error.read.payload if isinstance(error, topics.LateCommand) else None
+        if row is topics.CAMERA_ORDER:
+            key, value = orders.canonical(levels["key"]), wanted.value if wanted else ""
+        elif row is topics.CAMERA_POSITION_SET:
+            key, value = "Position", wanted.model_dump(exclude={"id", "by"}, exclude_none=True) if wanted else {}
+        else:
+            return
+        job = life.job(key, value, wanted.by if wanted else "human", wanted.id if wanted else None, message)
+        self.answers.tell(job, "refused", str(error))
 
     def tick(self, now: float) -> Iterable[Message]:
         """Wakes the plans, and publishes what has changed."""

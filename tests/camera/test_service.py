@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,6 +12,7 @@ from services import payloads
 from services.bus import Message
 from services.camera.requests import Away, BadLogin, Direction, Start, Status, Stop
 from services.errors import BadMessage
+from services.topics import read
 from tests.camera.flat import Flat
 from tests.camera.motors import Motors
 
@@ -42,6 +44,32 @@ def test_keys_and_place_names_are_matched_without_regard_to_case(flat: Flat) -> 
     flat.until(flat.ended)
     assert flat.last()["key"] == "Goto"
     assert flat.states() == LIFE
+
+
+@pytest.mark.parametrize(
+    ("topic", "payload", "fields", "key", "order_id", "told"),
+    [
+        ("order/Goto", b'{"value": "Kitchen", "id": "late"}', {"retain": True}, "Goto", "late", "a retained command"),
+        ("order/goto", b"Kitchen", {"received": 1.0}, "Goto", None, "s old"),
+        ("order/Scan", b'{"value": ', {}, "Scan", None, "Invalid JSON"),
+        ("order/Goto", b"\xff\xfe", {}, "Goto", None, "UTF-8"),
+        ("position/set", b'{"pan": 10, "id": "p"}', {"retain": True}, "Position", "p", "a retained command"),
+        ("position/set", b"{}", {}, "Position", None, "at least one"),
+    ],
+)
+def test_an_order_that_is_late_or_makes_no_sense_is_refused_with_an_answer(
+    flat: Flat, topic: str, payload: bytes, fields: dict[str, Any], key: str, order_id: str | None, told: str
+) -> None:
+    message = Message(f"camera/ip1/{topic}", payload, received=flat.now)._replace(**fields)
+    with pytest.raises(BadMessage):
+        list(flat.service.handle(message, flat.now))
+    answers = [
+        read(one, flat.now).payload for one in flat.service.tick(flat.now) if one.topic.endswith("/order_result")
+    ]
+    assert [(answer.state, answer.key) for answer in answers] == [("refused", key)]
+    assert told in (answers[0].error or "")
+    assert order_id in (None, answers[0].id)
+    assert flat.motors.running is None
 
 
 def test_the_answer_also_goes_where_the_one_who_asked_wants_it(flat: Flat) -> None:
