@@ -280,6 +280,10 @@ def markdown(rows: Iterable[Topic] = TABLE) -> str:
         payload = {str: "text", bytes: "JPEG"}.get(row.payload, f"`{row.payload.__name__}`")
         lines.append(
             f"| `{row.pattern}` | {row.kind.value} | {payload} | {'yes' if row.stored else ''} "
-            f"| {', '.join(row.writers)} | {', '.join(row.readers)} | {row.meaning} |"
+            f"| {_listed(row.writers)} | {_listed(row.readers)} | {row.meaning} |"
         )
     return "\n".join(lines) + "\n"
+
+
+def _listed(roles: tuple[str, ...]) -> str:
+    return ", ".join(f"`{role}`" for role in roles)
