@@ -85,17 +85,19 @@ def check(config: Config = CONFIG) -> None:
 @app.command(name="topics", epilog="Example: apartment topics --write bus_topics.md")
 def topics_(
     write: Annotated[Path | None, typer.Option(help="Write the table there.")] = None,
-    acl: Annotated[
-        Path | None, typer.Option(help="Write the broker's access list there, for the cameras of --config.")
-    ] = None,
+    acl: Annotated[Path | None, typer.Option(help="Write the broker's access list there.")] = None,
+    passwords: Annotated[Path | None, typer.Option(help="Write the broker's password file there.")] = None,
     config: Config = CONFIG,
 ) -> None:
-    """Show the table of topics, or write the files that come from it."""
+    """Show the table of topics, or write the files that come from it and from the accounts of the configuration."""
     if write is not None:
         write.write_text(topics.markdown(), encoding="utf-8")
     if acl is not None:
         acl.write_text(access.acl(load(config).cameras), encoding="utf-8")
-    if write is None and acl is None:
+    if passwords is not None:
+        accounts = load(config).bus.accounts
+        access.write_passwords(passwords, {name: one.get_secret_value() for name, one in accounts.items() if one})
+    if write is acl is passwords is None:
         _say(topics.markdown())
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -38,6 +40,18 @@ def test_our_password_lines_are_those_of_mosquitto_passwd(tmp_path: Path) -> Non
     theirs, ours = plain.read_text().split("$"), access.password_line("bridge", "invented").split("$")
     assert ours[:3] == theirs[:3]
     assert [len(part) for part in ours] == [len(part.rstrip("\n")) for part in theirs]
+
+
+def test_the_command_line_writes_both_files_from_the_accounts_of_the_configuration(tmp_path: Path) -> None:
+    files = ["--acl", str(tmp_path / "acl"), "--passwords", str(tmp_path / "passwords")]
+    words = [sys.executable, "-m", "services", "topics", *files, "--config", "config/simulated.yaml"]
+    environment = {**os.environ, "BUS_BRIDGE_PASSWORD": "invented", "BUS_OPERATOR_PASSWORD": "invented too"}
+    subprocess.run(words, env=environment, cwd=ROOT, check=True, timeout=60)
+    assert (tmp_path / "acl").read_text() == (ROOT / "mosquitto/acl").read_text()
+    lines = (tmp_path / "passwords").read_text().splitlines()
+    assert sorted(line.partition(":")[0] for line in lines) == ["bridge", "operator"]
+    assert "invented" not in "".join(lines)
+    assert (tmp_path / "passwords").stat().st_mode & 0o777 == 0o600
 
 
 @pytest.mark.mosquitto
