@@ -72,6 +72,7 @@ def scan(flat: VirtualApartment, rng: random.Random) -> float:
 
 PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "kills": (lambda: real(lambda flat, rng: trials.kill(flat, rng.choice(trials.BUS_SERVICES))), 40, "s until online"),
+    "camera": (lambda: real(lambda flat, rng: trials.kill_camera(flat)), 10, "s until an order is done"),
     "broker": (
         lambda: real(lambda flat, rng: trials.restart_broker(flat, rng.choice([signal.SIGTERM, signal.SIGKILL]))),
         20,
