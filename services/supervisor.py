@@ -27,6 +27,7 @@ log = logging.getLogger(__name__)
 
 SETTLED_S = 3.0  # a service that lived so long starts again at once; one that crashes while starting waits
 BACKOFF_S = (0.2, 30.0)  # after a short life: first, longest; doubled each time
+KILLED_S = 1.0  # the longest for one that somebody killed: it is back within 3 s however often that happens
 READY_S = 60.0  # a small machine imports OpenCV for some seconds
 GRACE_S = 5.0  # between SIGTERM and SIGKILL
 
@@ -133,7 +134,8 @@ class Supervisor:
     def _plan_restart(self, child: Child, code: int) -> None:
         now = time.monotonic()
         child.failures = 0 if now - child.started > SETTLED_S else child.failures + 1
-        pause = 0.0 if child.failures == 0 else min(BACKOFF_S[0] * 2 ** (child.failures - 1), BACKOFF_S[1])
+        longest = KILLED_S if code < 0 else BACKOFF_S[1]
+        pause = 0.0 if child.failures == 0 else min(BACKOFF_S[0] * 2 ** (child.failures - 1), longest)
         child.start_at, child.process = now + pause, None
         log.error("%s ended with %s; again in %.1f s", child.name, _outcome(code), pause)
 

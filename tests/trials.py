@@ -74,16 +74,25 @@ def kill_camera(flat: Simulated) -> float:
 
 
 def restart_broker(flat: Simulated, how: signal.Signals) -> float:
-    """Ends the broker and starts it again; seconds until every service is online, subscribed and heard."""
+    """Ends the broker and starts it again; seconds until every service is connected, online and heard.
+
+    That they are connected is read in the broker's own log: a retained `online` may be from before.
+    """
     before, parts = pids(flat), flat.parts
+    log = parts.folder / "mosquitto" / "mosquitto.log"
     if how is signal.SIGKILL:
         os.kill(parts.broker_pid, signal.SIGKILL)
     parts.broker.close()
+    old = len(log.read_text())
     start_mosquitto(parts)
     back = time.monotonic()
-    with connected(flat.apartment.bus, ["service/+/status", "home/Kitchen_Light/+", "camera/ip1/places"]) as bus:
+    peers.wait_until(
+        lambda: all(f" as {name} (" in log.read_text()[old:] for name in BUS_SERVICES), "all services", 10.0
+    )
+    with connected(flat.apartment.bus, ["service/+/status", "home/Kitchen_Light/+", "camera/ip1/#"]) as bus:
         for name in BUS_SERVICES:
             bus.payload(f"service/{name}/status", lambda text: text == "online")
+        assert bus.order("ip1", "SetTarget", "582").state == "done"
         seconds = time.monotonic() - back
         bus.payload("camera/ip1/places")
         switch(bus)
