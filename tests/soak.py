@@ -6,9 +6,7 @@ Prints its figures, and the seed that repeats them.
 from __future__ import annotations
 
 import argparse
-import os
 import random
-import shutil
 import signal
 import statistics
 import tempfile
@@ -20,7 +18,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from services.simulated import CONFIG, Simulated, parts_of, services_of
+from services.simulated import Simulated, parts_of, services_of
 from services.virtual import VirtualApartment
 from tests import trials
 
@@ -42,11 +40,8 @@ def real(trial: Callable[[Simulated, random.Random], float]) -> Iterator[Turn]:
 @contextmanager
 def virtual(trial: Callable[[VirtualApartment, random.Random], float]) -> Iterator[Turn]:
     """Turns in virtual time, one apartment for all."""
-    with tempfile.TemporaryDirectory() as name:
-        config = Path(shutil.copytree(CONFIG, Path(name) / "config")) / "simulated.yaml"
-        own = {"APARTMENT_DATABASE": f"sqlite:///{name}/bus.db", "APARTMENT_WITHOUT_ROS": "true"}
-        with VirtualApartment(config, {**os.environ, **own}) as flat:
-            yield lambda rng: trial(flat, rng)
+    with tempfile.TemporaryDirectory() as name, trials.virtual_flat(Path(name)) as flat:
+        yield lambda rng: trial(flat, rng)
 
 
 def move(flat: VirtualApartment, rng: random.Random) -> float:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -16,21 +14,14 @@ from services.simulated import Simulated
 from services.simulators.world import load as load_world
 from services.topics import read
 from services.virtual import VirtualApartment
+from tests.trials import virtual_flat
 
 CONFIG = Path(__file__).parents[1] / "config"
 
 
-@contextmanager
-def _flat(folder: Path) -> Iterator[VirtualApartment]:
-    config = Path(shutil.copytree(CONFIG, folder / "config")) / "simulated.yaml"
-    own = {"APARTMENT_DATABASE": f"sqlite:///{folder}/bus.db", "APARTMENT_WITHOUT_ROS": "true"}
-    with VirtualApartment(config, own) as flat:
-        yield flat
-
-
 @pytest.fixture
 def flat(tmp_path: Path) -> Iterator[VirtualApartment]:
-    with _flat(tmp_path / "flat") as flat:
+    with virtual_flat(tmp_path) as flat:
         yield flat
 
 
@@ -57,7 +48,7 @@ def test_a_place_is_reached_again_from_the_other_side(flat: VirtualApartment) ->
 
 def test_the_same_start_gives_the_same_scan_to_the_millisecond(tmp_path: Path) -> None:
     def scan(folder: Path) -> tuple[float, bytes]:
-        with _flat(folder) as flat:
+        with virtual_flat(folder) as flat:
             flat.order("ip1", "Scan", "ON")
             found = next(m for m in flat.client.seen if m.topic == "camera/ip1/scan/result")
             place = read(found, flat.now).payload.position

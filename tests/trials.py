@@ -9,14 +9,28 @@ import json
 import os
 import random
 import re
+import shutil
 import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 from services import peers, topics
 from services.client import Client, connected
-from services.simulated import Simulated, start_mosquitto
+from services.simulated import CONFIG, Simulated, start_mosquitto
+from services.virtual import VirtualApartment
 
 BUS_SERVICES = ("camera-ip1", "bridge", "persistence", "simulated-home")
+
+
+@contextmanager
+def virtual_flat(folder: Path) -> Iterator[VirtualApartment]:
+    """The simulated apartment in virtual time, on a copy of its configuration and a database of its own."""
+    config = Path(shutil.copytree(CONFIG, folder / "config")) / "simulated.yaml"
+    own = {"APARTMENT_DATABASE": f"sqlite:///{folder}/bus.db", "APARTMENT_WITHOUT_ROS": "true"}
+    with VirtualApartment(config, own) as flat:
+        yield flat
 
 
 def pids(flat: Simulated, without: str = "") -> dict[str, int]:

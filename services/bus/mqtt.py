@@ -106,7 +106,7 @@ class MqttBus:
         """See `Bus`."""
         self._keep_up()
         if not most:
-            self._lost.wait(timeout)
+            self._closing.wait(timeout)
             return []
         if self._busy:
             time.sleep(GATHER_S)

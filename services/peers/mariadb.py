@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from services.access import write_private
 from services.peers import free_port, program, running
 
 PACKAGE = "mariadb-server"
@@ -82,7 +83,7 @@ def private(folder: Path, port: int = 0) -> Iterator[Server]:
         (folder / "installed").touch()
     known = _known(folder / "accounts.json", port)
     setup = folder.resolve() / "setup.sql"
-    _write_private(setup, _setup(known))
+    write_private(setup, _setup(known))
     with _socket(folder) as socket:
         arguments = [command, *_options(data), f"--port={known['port']}", f"--socket={socket}", f"--init-file={setup}"]
         with running(arguments, folder / "mariadb.log", lambda: _greets(int(known["port"]))) as process:
@@ -141,14 +142,8 @@ def _known(file: Path, port: int) -> dict[str, str]:
         "password": secrets.token_urlsafe(24),
         "reader_password": secrets.token_urlsafe(24),
     }
-    _write_private(file, json.dumps(made))
+    write_private(file, json.dumps(made))
     return made
-
-
-def _write_private(file: Path, text: str) -> None:
-    descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-    with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
-        stream.write(text)
 
 
 @contextmanager
