@@ -80,11 +80,15 @@ DOORS: dict[str, tuple[str, ...]] = {
     "httpx": (
         "services.virtual.wire",
         "services.camera.brands.",
-        "services.camera.digest",
-        "services.camera.web",
+        "services.camera.web.",
         "services.openhab.rest",
     ),
-    "cv2": ("services.vision.", "services.camera.video", "services.bridge.images", "services.simulators.camera."),
+    "cv2": (
+        "services.vision.",
+        "services.camera.video.",
+        "services.bridge.images",
+        "services.simulators.camera.",
+    ),
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),
@@ -101,7 +105,8 @@ DOORS: dict[str, tuple[str, ...]] = {
 # Pure: what decides has no clock and does no input or output.
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
-    "services.bus", "services.vision.", "services.camera.move", "services.camera.scan", "services.bridge.rules",
+    "services.bus", "services.vision.", "services.camera.ptz.move", "services.camera.scan.search",
+    "services.camera.brands.dahua.", "services.bridge.rules",
     "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
     "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",
     "services.simulators.devices", "services.simulators.life",
@@ -342,7 +347,7 @@ def test_no_test_sleeps() -> None:
 @pytest.mark.parametrize(
     ("module", "other", "allowed"),
     [
-        ("services.camera.service", "services.camera.move", True),
+        ("services.camera.service", "services.camera.ptz.move", True),
         ("services.camera.service", "services.vision.detect", True),
         ("services.camera.service", "services.bridge.rules", False),
         ("services.mission.plan", "services.vision", False),
@@ -354,7 +359,7 @@ def test_no_test_sleeps() -> None:
         ("services.bus.mqtt", "services.bus.memory", False),
         ("services.camera.service", "services.bus.mqtt", False),
         ("services.vision.detect", "services.topics", False),
-        ("services.simulators.camera.scene", "services.simulators.world", True),
+        ("services.simulators.camera.view.scene", "services.simulators.world", True),
         ("services.demo", "services.camera.service", True),
         ("services.camera.service", "services.demo", False),
         ("services.config", "services.supervisor", False),

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from services import topics
-from services.camera import orders, video
+from services.camera import orders
 from services.camera.bulletin import Bulletin
 from services.camera.health import Health
 from services.camera.orders import Command
 from services.camera.places import Places
 from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.ptz.stand import settle
 from services.camera.requests import (
     Away,
     ClearPreset,
@@ -23,8 +24,8 @@ from services.camera.requests import (
     Snapshot,
     Status,
 )
-from services.camera.scanner import Scanner
-from services.camera.stand import settle
+from services.camera.scan.scanner import Scanner
+from services.camera.video import pictures
 from services.payloads import Place
 
 WITHOUT_CAMERA = orders.ShowScan | orders.Targets | orders.Routine  # these are taken while it is away too
@@ -58,9 +59,9 @@ class Chores:
         """Takes a picture and publishes it upright."""
         reply = yield from ask(Snapshot())
         jpeg, picture = cast(bytes, reply.result), self.scanner.picture
-        image = video.decode(jpeg)
-        turned = video.upright(image, flip=picture.flip, mirror=picture.mirror, kind=self.scanner.kind)
-        data = jpeg if turned is image else video.encode(turned)
+        image = pictures.decode(jpeg)
+        turned = pictures.upright(image, flip=picture.flip, mirror=picture.mirror, kind=self.scanner.kind)
+        data = jpeg if turned is image else pictures.encode(turned)
         self.bulletin.publish(topics.CAMERA_SNAPSHOT.message(data, cam=self.bulletin.camera))
 
     def _save(self, order: orders.SavePlace, now: float) -> Plan[None]:

@@ -1,7 +1,7 @@
 """The service of one camera: orders in, plans advanced on tick, states and results out. It never waits for the camera.
 
-It decides little itself: what an order means is `orders.py`, who has the motors `motors.py`, how to move `move.py`,
-how to scan `scan.py` and `scanner.py`, everything else that can be ordered `chores.py`, what is said `bulletin.py`.
+It decides little itself: what an order means is `orders.py`, who has the motors and how to move `ptz/`,
+how to scan `scan/`, everything else that can be ordered `chores.py`, what is said `bulletin.py`.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ from services import topics
 from services.bus import Message
 from services.camera import answers as life
 from services.camera import orders
-from services.camera.analysis import ANALYSED, Analysed, Analyst
 from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
 from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.device import REPLY, Sender
-from services.camera.goal import Goal
 from services.camera.health import Health
-from services.camera.motors import Motors
-from services.camera.move import goto
 from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
-from services.camera.pace import Skill
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
+from services.camera.ptz.goal import Goal
+from services.camera.ptz.motors import Motors
+from services.camera.ptz.move import goto
+from services.camera.ptz.pace import Skill
 from services.camera.requests import GetPicture, Identify, Identity, Picture, Rank, Reading, Refused, Reply, Status
-from services.camera.scanner import Scanner
+from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
+from services.camera.scan.scanner import Scanner
+from services.camera.scan.sightings import Eye
 from services.camera.settings import Config
-from services.camera.sightings import Eye
 from services.errors import BadMessage
 from services.payloads import Order, OrderState, PositionSet
 

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field, SecretStr, field_validator
 
-from services.camera.goal import Limits
+from services.camera.ptz.goal import Limits
 from services.section import Section
 from services.vision.frames import Mount
 

@@ -12,10 +12,10 @@ from services import camera
 from services.aside import Aside
 from services.bus.memory import Hub, MemoryBus
 from services.camera.address import Address
-from services.camera.analysis import Inline
 from services.camera.brands.amcrest import Amcrest
+from services.camera.scan.analysis import Inline
 from services.camera.service import CameraService
-from services.camera.start import eye
+from services.camera.program import eye
 from services.client import FINAL, Client
 from services.config import Instance, load
 from services.payloads import OrderResult, PositionSet

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from services.bus import Message
-from services.camera.analysis import ANALYSED, Analysed, Task
 from services.camera.device import REPLY
 from services.camera.requests import (
     GetPicture,
@@ -28,9 +27,10 @@ from services.camera.requests import (
     Start,
     Stop,
 )
+from services.camera.scan.analysis import ANALYSED, Analysed, Task
+from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
-from services.camera.sightings import Eye
 from services.errors import DeviceError
 from services.vision.detect import Detection
 from services.vision.frames import Mount

@@ -11,7 +11,6 @@ from pydantic import SecretStr
 
 from services.camera.address import Address
 from services.camera.brands import amcrest
-from services.camera.digest import Challenge, authorization, read_challenge
 from services.camera.requests import (
     Away,
     BadLogin,
@@ -33,6 +32,7 @@ from services.camera.requests import (
     Status,
     Stop,
 )
+from services.camera.web.digest import Challenge, authorization, read_challenge
 
 NEWER = (
     "status.Action=Preset\r\nstatus.MoveStatus=Idle\r\nstatus.PTS=0\r\nstatus.Postion[0]=91.600000\r\n"

@@ -7,9 +7,9 @@ from statistics import median
 
 import pytest
 
-from services.camera.goal import Limits
-from services.camera.move import goto
-from services.camera.pace import Skill
+from services.camera.ptz.goal import Limits
+from services.camera.ptz.move import goto
+from services.camera.ptz.pace import Skill
 from services.camera.requests import Refused, Start
 from tests.camera.motors import Motors, drive
 

@@ -20,7 +20,7 @@ from services.simulators.camera import events
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, Verdict
 from services.simulators.camera.messages import Answer, Request, read, refusal
-from services.simulators.camera.picture import Pictures, Stream
+from services.simulators.camera.view.picture import Pictures, Stream
 
 IMAGE = "image/jpeg"
 LOG_LENGTH = 2000

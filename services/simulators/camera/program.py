@@ -14,11 +14,11 @@ from services.errors import ConfigError
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door
 from services.simulators.camera.http import CameraServer
-from services.simulators.camera.picture import Pictures
 from services.simulators.camera.profiles import PROFILES
-from services.simulators.camera.scene import Scene
 from services.simulators.camera.settings import Config
 from services.simulators.camera.side_door import SideDoor
+from services.simulators.camera.view.picture import Pictures
+from services.simulators.camera.view.scene import Scene
 from services.simulators.world import load
 
 POLL_S = 0.1  # how long a port may take to notice that it is to close

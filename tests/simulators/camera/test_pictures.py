@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from services.simulators.camera import prints
-from services.simulators.camera.optics import distort, project, rays, undistort, window
-from services.simulators.camera.picture import blurred
-from services.simulators.camera.scene import Scene
+from services.simulators.camera.view import prints
+from services.simulators.camera.view.optics import distort, project, rays, undistort, window
+from services.simulators.camera.view.picture import blurred
+from services.simulators.camera.view.scene import Scene
 from services.simulators.world import World
 from tests.simulators.camera.edges import refined
 

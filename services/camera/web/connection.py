@@ -5,8 +5,8 @@ from __future__ import annotations
 import httpx
 
 from services.camera.address import Address
-from services.camera.digest import Login
 from services.camera.requests import Away
+from services.camera.web.digest import Login
 
 COMMAND = httpx.Timeout(6.0, connect=2.0)
 SNAPSHOT = httpx.Timeout(20.0, connect=2.0)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from services.simulators.camera.looks import DENSITY, LOOKS, Image
+from services.simulators.camera.view.looks import DENSITY, LOOKS, Image
 from services.simulators.true_camera import XY
 from services.simulators.world import World
 

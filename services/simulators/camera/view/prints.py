@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from services.simulators.camera.optics import Float32, Window, project
-from services.simulators.camera.solids import Box
+from services.simulators.camera.view.optics import Float32, Window, project
+from services.simulators.camera.view.solids import Box
 from services.simulators.true_camera import Lens
 from services.simulators.world import Marker
 from services.vision.frames import Array, Transform

@@ -1,6 +1,6 @@
 """Runs scans: hands frames to the ones who look for markers, and publishes how far it is and what came out.
 
-The scan itself is `scan.py`; looking `analysis.py`; from sightings to places in the apartment `sightings.py`.
+The scan itself is `search.py`; looking `analysis.py`; from sightings to places in the apartment `sightings.py`.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from uuid import uuid4
 
 from services import topics
 from services.bus import Message
-from services.camera import sightings
-from services.camera.analysis import Analysed, Analyst, Task
 from services.camera.bulletin import Bulletin
 from services.camera.orders import ScanFor
-from services.camera.pace import Skill
 from services.camera.places import Places
 from services.camera.plan import Plan, attempt
+from services.camera.ptz.pace import Skill
 from services.camera.requests import GetPicture, Picture, Refused
-from services.camera.scan import Frame, Scan, shortest
+from services.camera.scan import sightings
+from services.camera.scan.analysis import Analysed, Analyst, Task
+from services.camera.scan.search import Frame, Scan, shortest
+from services.camera.scan.sightings import Eye
 from services.camera.settings import Config
-from services.camera.sightings import Eye
 from services.payloads import OrderState, Place, ScanState
 
 STATE_S = 0.5  # between two states of a scan that runs

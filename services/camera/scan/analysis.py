@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from services.bus import Message
-from services.camera import video
 from services.camera.requests import Away
+from services.camera.video import pictures
 from services.runner import Post
 from services.vision.detect import Detection, detect
 
@@ -66,17 +66,17 @@ class Analyst(Protocol):
 def analyse(task: Task) -> Analysed:
     """Decodes, sets upright, finds the markers, draws them when asked."""
     try:
-        image = video.upright(video.decode(task.jpeg), flip=task.flip, mirror=task.mirror, kind=task.kind)
+        image = pictures.upright(pictures.decode(task.jpeg), flip=task.flip, mirror=task.mirror, kind=task.kind)
     except Away as error:
         return Analysed(task.scan, task.number, error=str(error))
     found = tuple(detect(image, task.dictionary, task.targets))
-    jpeg = video.encode(video.drawn(image, [(one.marker, one.corners) for one in found])) if task.draw else None
+    jpeg = pictures.encode(pictures.drawn(image, [(one.marker, one.corners) for one in found])) if task.draw else None
     return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), found, jpeg)
 
 
 def _begin_work() -> None:
     """In a worker process: one thread of OpenCV, and an end when the service is killed."""
-    video.one_thread()
+    pictures.one_thread()
     threading.Thread(target=_follow_parent, daemon=True).start()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from services.simulators.camera.solids import NORMALS, Box
+from services.simulators.camera.view.solids import NORMALS, Box
 from services.vision.frames import Array
 
 TOUCHING_M = 0.001  # boxes may overlap by this much and still count as apart: things lie on tables

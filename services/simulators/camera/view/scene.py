@@ -13,13 +13,13 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from services.simulators.camera import prints
-from services.simulators.camera.looks import DENSITY
-from services.simulators.camera.optics import Float32, Window, rays
-from services.simulators.camera.order import Indexes, Order
-from services.simulators.camera.prints import Image, View
-from services.simulators.camera.solids import SIDES, boxes
-from services.simulators.camera.textures import floor, generator, texture
+from services.simulators.camera.view import prints
+from services.simulators.camera.view.looks import DENSITY
+from services.simulators.camera.view.optics import Float32, Window, rays
+from services.simulators.camera.view.order import Indexes, Order
+from services.simulators.camera.view.prints import Image, View
+from services.simulators.camera.view.solids import SIDES, boxes
+from services.simulators.camera.view.textures import floor, generator, texture
 from services.simulators.true_camera import Lens
 from services.simulators.world import World
 from services.vision.frames import Array, Transform

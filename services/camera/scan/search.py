@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from itertools import pairwise, permutations
 from typing import Literal, cast
 
-from services.camera.analysis import Analysed
-from services.camera.goal import Limits
-from services.camera.move import goto
-from services.camera.pace import Skill
 from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.ptz.goal import Limits
+from services.camera.ptz.move import goto
+from services.camera.ptz.pace import Skill
 from services.camera.requests import Away, Reading, Snapshot
-from services.camera.sightings import Sighting, between
+from services.camera.scan.analysis import Analysed
+from services.camera.scan.sightings import Sighting, between
 from services.payloads import Place, ScanState
 from services.vision.frames import Kind
 

@@ -7,12 +7,12 @@ from contextlib import contextmanager
 
 from services import document
 from services.camera.address import Address
-from services.camera.analysis import Pool
 from services.camera.device import Device
 from services.camera.places import Places
+from services.camera.scan.analysis import Pool
+from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
-from services.camera.sightings import Eye
 from services.camera.watchdog import Watchdog, connector
 from services.errors import ConfigError
 from services.runner import Post

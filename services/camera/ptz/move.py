@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import cast
 
-from services.camera.goal import Goal, Limits, Pose
-from services.camera.pace import Skill
 from services.camera.plan import Plan, ask, wait
+from services.camera.ptz.goal import Goal, Limits, Pose
+from services.camera.ptz.pace import Skill
+from services.camera.ptz.stand import GAP_S, settle, stop
 from services.camera.requests import Direction, Reading, Refused, Reply, Start, Status
-from services.camera.stand import GAP_S, settle, stop
 from services.errors import DeviceError
 
 TOLERANCE: Pose = (0.4, 0.4, 0.5)  # 0.5 degree promised, 0.1 is the readings' own

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.motors import Pose, magnification
-from services.simulators.camera.optics import Window, project, window
-from services.simulators.camera.prints import Image
-from services.simulators.camera.scene import Scene
+from services.simulators.camera.view.optics import Window, project, window
+from services.simulators.camera.view.prints import Image
+from services.simulators.camera.view.scene import Scene
 from services.simulators.true_camera import WorldCamera
 from services.vision.frames import Array
 

@@ -1,0 +1,76 @@
+"""The motors: start and stop, presets, and where the camera looks (`ptz.cgi`). Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from services.camera.brands.dahua.replies import read_table
+from services.camera.requests import Away, Direction, Reading, Start
+
+CODES = {
+    Direction.LEFT: "Left",
+    Direction.RIGHT: "Right",
+    Direction.UP: "Up",
+    Direction.DOWN: "Down",
+    Direction.LEFT_UP: "LeftUp",
+    Direction.RIGHT_UP: "RightUp",
+    Direction.LEFT_DOWN: "LeftDown",
+    Direction.RIGHT_DOWN: "RightDown",
+    Direction.ZOOM_IN: "ZoomTele",
+    Direction.ZOOM_OUT: "ZoomWide",
+}
+
+
+def ptz(action: str, code: str, channel: int, arguments: tuple[int, int, int] = (0, 0, 0)) -> str:
+    """The request target of a command to the motors."""
+    args = "".join(f"&arg{index}={value}" for index, value in enumerate(arguments, start=1))
+    return f"/cgi-bin/ptz.cgi?action={action}&channel={channel}&code={code}{args}"
+
+
+def start(request: Start, channel: int) -> str:
+    """Starts a motion; a diagonal with a speed of 0 would be ignored, so speeds are 1 to 8."""
+    right, down, zoom = request.direction.value
+    speed = min(8, max(1, request.speed))
+    if zoom:
+        return ptz("start", CODES[request.direction], channel)
+    if right and down:
+        vertical = min(8, max(1, request.tilt_speed or speed))
+        return ptz("start", CODES[request.direction], channel, (vertical, speed, 0))
+    return ptz("start", CODES[request.direction], channel, (0, speed, 0))
+
+
+def stop(direction: Direction, channel: int) -> str:
+    """Stops the motion of that code."""
+    return ptz("stop", CODES[direction], channel)
+
+
+def preset(code: str, number: int, channel: int) -> str:
+    """GotoPreset, SetPreset or ClearPreset."""
+    return ptz("start", code, channel, (0, number, 0))
+
+
+def status(channel: int) -> str:
+    """Asks where the camera looks."""
+    return f"/cgi-bin/ptz.cgi?action=getStatus&channel={channel}"
+
+
+def read_status(body: str) -> Reading:
+    """The pose, from any form of status; Away when there is none in it."""
+    table = read_table(body)
+    values = [
+        next((table[key] for key in (f"status.Postion[{axis}]", f"status.Position[{axis}]") if key in table), None)
+        for axis in range(3)
+    ]
+    try:
+        pan, tilt = float(values[0] or ""), float(values[1] or "")
+        zoom = float(values[2] or table.get("status.Zoom", "0"))
+    except ValueError as error:
+        raise Away(f"expected a position in the status, got {body[:80]!r}") from error
+    return Reading(pan, tilt, zoom, _moving(table))
+
+
+def _moving(table: Mapping[str, str]) -> bool | None:
+    words = {table.get(f"status.{key}", "") for key in ("MoveStatus", "ZoomStatus", "PanTiltStatus")}
+    if words & {"Moving", "Zooming"}:
+        return True
+    return False if "Idle" in words else None

@@ -1,0 +1,1 @@
+"""HTTP to a camera: the connection, its timeouts and its login. What is said over it is the brand's."""

@@ -1,0 +1,1 @@
+"""What the simulated camera sees: the scene, the lens, and how its picture comes out."""
