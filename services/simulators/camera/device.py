@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from random import Random
 from threading import RLock
 
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.events import Events
+from services.simulators.camera.latency import Latency
 from services.simulators.camera.messages import OK, Answer, Request, lines, refusal
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.profiles import Profile
@@ -20,10 +22,11 @@ Program = Callable[[Request, float], Answer]
 class Device:
     """One camera; safe for several threads, each call is one step."""
 
-    def __init__(self, camera: WorldCamera, profile: Profile, now: float) -> None:
+    def __init__(self, camera: WorldCamera, profile: Profile, now: float, latency: Latency | None = None) -> None:
         self.camera, self.profile = camera, profile
+        self.latency = latency or Latency(profile, None, Random(1))
         self.tables = Tables(profile, camera.lens)
-        self.ptz = Ptz(camera, profile, self.tables, now)
+        self.ptz = Ptz(camera, profile, self.tables, self.latency, now)
         self.events = Events()
         self.boots_until = float("-inf")
         self._lock = RLock()
