@@ -13,9 +13,9 @@ from services.aside import Aside
 from services.bus.memory import Hub, MemoryBus
 from services.camera.address import Address
 from services.camera.brands.amcrest import Amcrest
+from services.camera.program import eye
 from services.camera.scan.analysis import Inline
 from services.camera.service import CameraService
-from services.camera.program import eye
 from services.client import FINAL, Client
 from services.config import Instance, load
 from services.payloads import OrderResult, PositionSet
