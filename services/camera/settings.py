@@ -64,6 +64,7 @@ class Config(Section):
     dictionary: str = "DICT_5X5_1000"
     markers: MarkerSizes = MarkerSizes()
     targets: tuple[int, ...] = ()
+    discovery: bool = False  # tell Home Assistant and openHAB what there is (`homeassistant/#`)
     picture: PictureOptions = PictureOptions()
     pan_dead_arc: Pair = (179.0, 186.0)  # readings that the camera cannot reach, degrees
     tilt_range: Pair = (-10.0, 108.0)
