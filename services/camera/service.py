@@ -61,6 +61,7 @@ class CameraService:
         self.skill = Skill()
         self.skill.forget_senses(flip=config.picture.flip, mirror=config.picture.mirror)
         self.bulletin = Bulletin(config.name, self.health, self.places, publish)
+        self.bulletin.diagnostics = config.diagnostics
         self.discovery = Discovery(config.name, publish, on=config.discovery)
         self.answers = Answers(config.name, publish, self.bulletin.position)
         self.stage = Stage(sender.submit)
