@@ -60,6 +60,7 @@ class Config(Section):
     rtsp_port: int = Field(default=554, ge=1, le=65535)
     user: str = ""
     password: SecretStr = SecretStr("")
+    login_retry_s: float = Field(default=120.0, ge=1)  # after a wrong password; doubles each time, up to 30 minutes
     channel: Literal[0, 1] | None = None  # of the motors; None: found out
     camera_info: Path | None = None  # of the upright picture at the widest zoom
     places: Path = Path("places")  # folder of the report's two files
