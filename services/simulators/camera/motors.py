@@ -132,11 +132,11 @@ class Motors:
         if self._past[-1].code == code:
             self.halt(now)
 
-    def go(self, code: str, goal: Pose, now: float, level: int = 8) -> None:
+    def go(self, goal: Pose, now: float, code: str = "GotoPreset", level: int = 8) -> None:
         """Drives all axes to a pose, clamped to the stops; never through the dead arc."""
-        self.drive(code, travel(goal), now, level)
+        self.drive(travel(goal), now, code, level)
 
-    def drive(self, code: str, goal: Axes, now: float, level: int = 8) -> None:
+    def drive(self, goal: Axes, now: float, code: str, level: int = 8) -> None:
         """The same, to positions of the motors."""
         self._begin(code, now, lambda axis, rail, at: go(rail, at, now, goal[axis], rail.speed(level)))
         self._motions += 1

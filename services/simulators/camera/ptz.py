@@ -86,7 +86,7 @@ class Ptz:
         if number not in self.presets:
             return refusal(self._profile)
         self._preset = number
-        self.motors.go("GotoPreset", self.presets[number][1], now)
+        self.motors.go(self.presets[number][1], now)
         return OK
 
     def _set_preset(self, request: Request, now: float) -> Answer:
@@ -109,7 +109,7 @@ class Ptz:
         if not all(isfinite(value) for value in goal):
             return refusal(self._profile)
         goal = goal if self._profile.position_abs == "full" else goal._replace(tilt=here.tilt)
-        self.motors.go("PositionABS", goal, now)
+        self.motors.go(goal, now, "PositionABS")
         return OK
 
     def _status(self, request: Request, now: float) -> Answer:

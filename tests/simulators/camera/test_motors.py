@@ -77,7 +77,7 @@ def test_a_motion_ends_at_its_end_stop(motors: Motors, at: Pose, code: str, end:
 
 def test_the_way_to_the_other_side_of_the_dead_arc_leads_through_zero(motors: Motors) -> None:
     motors.place(Pose(170.0, 20.0, 0.0), 100.0)
-    motors.go("GotoPreset", Pose(190.0, 20.0, 0.0), 100.0)
+    motors.go(Pose(190.0, 20.0, 0.0), 100.0)
     seen = [motors.pose(100.0 + i / 10).pan for i in range(90)]
     assert not any(179.0 < pan < 186.0 for pan in seen)
     assert seen[80] == pytest.approx(190.0)
@@ -166,7 +166,7 @@ def test_a_start_too_short_for_full_speed_goes_as_far_as_the_acceleration_allows
 def test_a_goal_takes_the_time_of_its_trapezoid(motors: Motors, goal: Pose, seconds: float) -> None:
     start = Pose(0.0, 20.0, 0.0)
     motors.place(start, 100.0)
-    motors.go("PositionABS", goal, 100.0)
+    motors.go(goal, 100.0)
     halfway = [(a + b) / 2 for a, b in zip(start, goal, strict=True)]
     assert motors.pose(100.0 + seconds / 2) == pytest.approx(halfway)
     assert any(motors.rates(100.0 + seconds - 0.01))
@@ -185,7 +185,7 @@ def test_turning_round_takes_the_way_of_the_braking_first(motors: Motors) -> Non
 
 def test_a_goal_behind_is_reached_after_braking(motors: Motors) -> None:
     _started(motors, Pose(0.0, 20.0, 0.0), "Right", 8)
-    motors.go("GotoPreset", Pose(0.0, 20.0, 0.0), 101.0)
+    motors.go(Pose(0.0, 20.0, 0.0), 101.0)
     assert motors.pose(101.375).pan == pytest.approx(45.0)
     seconds = 45.0 / 45.0 + 0.375  # from rest, 45 degrees back
     assert any(motors.rates(101.375 + seconds - 0.01))
@@ -195,7 +195,7 @@ def test_a_goal_behind_is_reached_after_braking(motors: Motors) -> None:
 def test_a_goal_that_is_passed_while_braking_is_come_back_to(motors: Motors) -> None:
     _started(motors, Pose(0.0, 20.0, 0.0), "Right", 8)
     here = 45.0 - 8.4375
-    motors.go("GotoPreset", Pose(here + 5.0, 20.0, 0.0), 101.0)
+    motors.go(Pose(here + 5.0, 20.0, 0.0), 101.0)
     assert motors.pose(101.375).pan == pytest.approx(here + 8.4375)
     assert motors.pose(105.0).pan == pytest.approx(here + 5.0)
 
@@ -250,7 +250,7 @@ def test_a_camera_that_turns_away_from_its_end_stop_does_not_push(motors: Motors
 def test_the_way_there_and_back_is_counted_twice(motors: Motors) -> None:
     motors.place(Pose(0.0, 20.0, 0.0), 100.0)
     for number, pan in enumerate((30.0, 0.0)):
-        motors.go("GotoPreset", Pose(pan, 20.0, 0.0), 110.0 + 10 * number)
+        motors.go(Pose(pan, 20.0, 0.0), 110.0 + 10 * number)
     assert motors.worked(200.0).travelled == pytest.approx(Axes(60.0, 0.0, 0.0))
     assert motors.worked(200.0).motions == 2
 
