@@ -13,9 +13,9 @@ from services.aside import Aside
 from services.bus.memory import Hub, MemoryBus
 from services.camera.address import Address
 from services.camera.brands.amcrest import Amcrest
+from services.camera.program import eye
 from services.camera.scan.analysis import Inline
 from services.camera.service import CameraService
-from services.camera.program import eye
 from services.client import FINAL, Client
 from services.config import Instance, load
 from services.payloads import OrderResult, PositionSet
@@ -121,8 +121,7 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         simulator = self.apartment.instances["simulated-camera"].config
         assert isinstance(simulator, CameraSimulator)
         behind = inside(simulator, self.now)
-        address = Address(config.url, config.user, config.password, config.rtsp_port, config.channel)
-        link = Link(*(self._lane(simulator, behind, address, post) for _ in range(2)))
+        link = Link(*(self._lane(simulator, behind, config.address, post) for _ in range(2)))
         self.links.append(link)
         return CameraService(config, link, lambda: Inline(post), eye(config))
 
