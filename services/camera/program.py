@@ -13,6 +13,7 @@ from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
 from services.camera.watchdog import Watchdog, connector
+from services.camera.web.gate import Gate
 from services.errors import ConfigError
 from services.runner import Post
 from services.vision.lens import Lens
@@ -24,7 +25,8 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     address = config.address
     view = eye(config)
     watchdog = Watchdog(config.brand, address)
-    device = Device(connector(config.brand, address), post, turning=watchdog.tell)
+    gate = Gate(config.login_retry_s)
+    device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell)
     try:
         service = CameraService(config, device, lambda: Pool(post, config.workers), view)
         try:

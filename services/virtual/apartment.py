@@ -16,6 +16,7 @@ from services.camera.brands.amcrest import Amcrest
 from services.camera.program import eye
 from services.camera.scan.analysis import Inline
 from services.camera.service import CameraService
+from services.camera.web.gate import Gate
 from services.client import FINAL, Client
 from services.config import Instance, load
 from services.payloads import OrderResult, PositionSet
@@ -121,10 +122,11 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         simulator = self.apartment.instances["simulated-camera"].config
         assert isinstance(simulator, CameraSimulator)
         behind = inside(simulator, self.now)
-        link = Link(*(self._lane(simulator, behind, config.address, post) for _ in range(2)))
+        gate = Gate(clock=self.clock, pause=lambda seconds: None)
+        link = Link(*(self._lane(simulator, behind, config.address, post, gate) for _ in range(2)))
         self.links.append(link)
         return CameraService(config, link, lambda: Inline(post), eye(config))
 
-    def _lane(self, simulator: CameraSimulator, behind: Inside, address: Address, post: Post) -> Lane:
+    def _lane(self, simulator: CameraSimulator, behind: Inside, address: Address, post: Post, gate: Gate) -> Lane:
         wire = Wire(behind, PROFILES[simulator.profile], simulator.seed)
-        return Lane(Amcrest(address, wire), wire, post, self.clock)
+        return Lane(Amcrest(address, wire, gate), wire, post, self.clock)

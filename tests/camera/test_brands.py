@@ -37,6 +37,7 @@ from services.camera.requests import (
 )
 from services.camera.settings import Config
 from services.camera.watchdog import connector
+from services.camera.web.gate import Gate
 from services.errors import DeviceError
 from services.peers import free_port, wait_until
 from services.simulators import camera as simulated
@@ -77,7 +78,7 @@ def driver(brand: str, camera: simulated.Simulated) -> Iterator[Camera]:
 
 @contextmanager
 def driving(brand: str, url: str, password: str = PASSWORD) -> Iterator[Camera]:
-    with closing(connector(brand, Address(url, "ros", SecretStr(password)))()) as opened:
+    with closing(connector(brand, Address(url, "ros", SecretStr(password)), Gate())()) as opened:
         yield opened
 
 
@@ -220,11 +221,14 @@ def test_it_says_who_it_is(driver: Camera) -> None:
     assert identity.version.startswith("2.420.AC00.15.R")
 
 
-def test_a_wrong_password_is_a_bad_login_after_one_try(brand: str, camera: simulated.Simulated) -> None:
+def test_a_wrong_password_is_a_bad_login_and_not_tried_on(brand: str, camera: simulated.Simulated) -> None:
     with driving(brand, camera.url, "wrong-horse") as driver:
-        error = refusal(driver, Status())
-    assert isinstance(error, BadLogin)
-    assert state(camera)["door"]["wrong"] <= 1
+        assert isinstance(refusal(driver, Status()), BadLogin)
+        asked = len(camera.server.log)
+        assert isinstance(refusal(driver, Status()), BadLogin)
+        assert isinstance(refusal(driver, Stop()), BadLogin)
+    assert len(camera.server.log) == asked
+    assert state(camera)["door"]["wrong"] <= 3
 
 
 def test_nobody_there_is_away(brand: str) -> None:
@@ -264,7 +268,8 @@ def test_no_error_tells_the_password(brand: str, camera: simulated.Simulated) ->
 
 def test_it_closes_its_connections(brand: str) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
-        driver = connector(brand, Address(f"http://127.0.0.1:{server.getsockname()[1]}", "ros", SecretStr(PASSWORD)))()
+        address = Address(f"http://127.0.0.1:{server.getsockname()[1]}", "ros", SecretStr(PASSWORD))
+        driver = connector(brand, address, Gate())()
         asking = threading.Thread(target=lambda: refusal(driver, Status()))
         asking.start()
         connection, _ = server.accept()

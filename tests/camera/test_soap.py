@@ -14,6 +14,7 @@ from pydantic import SecretStr
 from services.camera.address import Address
 from services.camera.brands.onvif import Onvif, Profile, read_reading
 from services.camera.requests import Away, BadLogin, Locked, Refused, Status
+from services.camera.web.gate import Gate
 from services.camera.web.soap import FIRST, Soap, envelope, read_envelope, token
 
 ADDRESS = Address("http://192.0.2.10", "admin", SecretStr("secret123"))
@@ -75,7 +76,7 @@ class Device:
 
 def soap(device: Callable[[httpx.Request], httpx.Response]) -> Soap:
     http = httpx.Client(base_url=ADDRESS.url, transport=httpx.MockTransport(device))
-    return Soap(http, ADDRESS, lambda: NOW)
+    return Soap(http, ADDRESS, Gate(pause=lambda seconds: None), lambda: NOW)
 
 
 def test_a_login_holds_the_time_of_the_cameras_own_clock() -> None:
@@ -92,11 +93,24 @@ def test_a_camera_whose_clock_was_set_is_asked_for_the_time_again() -> None:
     assert device.created == ["unsigned", "2026-01-09T03:00", "unsigned", "2026-01-09T07:00"]
 
 
-def test_a_wrong_password_is_not_tried_twice() -> None:
-    device = Device(clock(3), fault("ter:NotAuthorized"), clock(3))
-    with pytest.raises(BadLogin):
-        soap(device).call(FIRST, "x", "Do")
-    assert [one for one in device.created if one != "unsigned"] == ["2026-01-09T03:00"]
+def test_a_wrong_password_is_tried_twice_and_no_more() -> None:
+    refused = fault("ter:NotAuthorized")
+    device = Device(clock(3), refused, clock(3), refused)
+    calls = soap(device)
+    for _ in range(3):
+        with pytest.raises(BadLogin):
+            calls.call(FIRST, "x", "Do")
+    assert device.answers == []
+
+
+def test_an_account_without_the_right_is_told_from_a_wrong_password() -> None:
+    refused, done = fault("ter:NotAuthorized"), envelope("", "<done/>")
+    device = Device(clock(3), done, refused, clock(3), refused, done, done)
+    calls = soap(device)
+    calls.call(FIRST, "x", "Do")
+    with pytest.raises(Refused, match="no right"):
+        calls.call(FIRST, "x", "Forbidden")
+    assert calls.call(FIRST, "x", "Do").tag == "done"
 
 
 @pytest.mark.parametrize(
@@ -128,6 +142,6 @@ def status(x: object, y: object) -> ElementTree.Element:
 
 def test_a_camera_without_ptz_service_says_so() -> None:
     services = envelope("", '<GetServicesResponse xmlns="http://www.onvif.org/ver10/device/wsdl"/>')
-    camera = Onvif(ADDRESS, httpx.MockTransport(Device(clock(3), services)))
+    camera = Onvif(ADDRESS, Gate(), httpx.MockTransport(Device(clock(3), services)))
     with pytest.raises(Refused, match="does not offer"):
         camera.send(Status())

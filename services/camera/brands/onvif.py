@@ -19,9 +19,10 @@ import httpx
 
 from services.camera import requests
 from services.camera.address import Address
-from services.camera.requests import Away, BadLogin, Camera, Identity, Reading, Refused, Start
+from services.camera.requests import Away, Camera, Identity, Reading, Refused, Start
 from services.camera.web.connection import SNAPSHOT, connection, fetch
 from services.camera.web.digest import Login
+from services.camera.web.gate import Gate
 from services.camera.web.soap import DEVICE, FIRST, SCHEMA, Soap
 
 MEDIA = "http://www.onvif.org/ver10/media/wsdl"
@@ -49,10 +50,12 @@ class Profile:
 class Onvif:
     """A Camera; where its services are, and its profile, are asked for once."""
 
-    def __init__(self, address: Address, transport: httpx.BaseTransport | None = None) -> None:
+    def __init__(
+        self, address: Address, gate: Gate, transport: httpx.BaseTransport | None = None, *, urgent: bool = False
+    ) -> None:
         self.address = address
-        self.http = connection(address, Login(address.user, address.password), transport)
-        self.soap = Soap(self.http, address)
+        self.http = connection(address, Login(address.user, address.password, gate, urgent=urgent), transport)
+        self.soap = Soap(self.http, address, gate, urgent=urgent)
         self._paths: dict[str, str] = {DEVICE: FIRST}
         self._profile: Profile | None = None
 
@@ -144,7 +147,7 @@ class Onvif:
         told = self._ask(MEDIA, "GetSnapshotUri", _token("ProfileToken", self._known_profile().token))
         answer = fetch(self.http, _local(told.findtext(f".//{SCHEMA}Uri") or ""), SNAPSHOT)
         if answer.status_code == 401:
-            raise BadLogin("the camera does not accept this user and password")
+            raise Away("the camera answered 401 without a reason to doubt the password")
         if not answer.content.startswith(b"\xff\xd8"):
             raise Away(f"expected a JPEG, got {answer.status_code} {answer.content[:40]!r}")
         return answer.content
@@ -155,9 +158,9 @@ class Onvif:
         return Identity(*(told.findtext(f"{{{DEVICE}}}{key}") or "" for key in keys))
 
 
-def connect(address: Address) -> Camera:
-    """A client for the camera there; nothing is sent yet."""
-    return Onvif(address)
+def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:
+    """A client for the camera there; nothing is sent yet. `urgent`: it is the one that moves the motors."""
+    return Onvif(address, gate, urgent=urgent)
 
 
 def velocity(request: Start) -> str:

@@ -19,6 +19,7 @@ import httpx
 
 from services.camera.address import Address
 from services.camera.requests import Away, BadLogin, Locked, Refused
+from services.camera.web.gate import ODD_S, Gate
 
 SOAP = "{http://www.w3.org/2003/05/soap-envelope}"
 SCHEMA = "{http://www.onvif.org/ver10/schema}"
@@ -36,22 +37,57 @@ class NotAuthorized(BadLogin):
 class Soap:
     """Calls to one device; its clock is asked for once, and again when it takes a login no more."""
 
-    def __init__(self, http: httpx.Client, address: Address, clock: Callable[[], float] = time.time) -> None:
-        self.http, self.address, self.clock = http, address, clock
+    def __init__(
+        self,
+        http: httpx.Client,
+        address: Address,
+        gate: Gate,
+        clock: Callable[[], float] = time.time,
+        *,
+        urgent: bool = False,
+    ) -> None:
+        self.http, self.address, self.gate, self.clock, self.urgent = http, address, gate, clock, urgent
         self._ahead: float | None = None  # the device's clock before ours, seconds
+        self._proven = False  # this user and password have worked here
 
     def call(self, path: str, service: str, action: str, inner: str = "") -> ElementTree.Element:
-        """The answer to one signed call; DeviceError when there is none or it is a fault."""
+        """The answer to one signed call; DeviceError when there is none or it is a fault.
+
+        Refused for want of rights: only asking for something that everybody may know tells that from a wrong password.
+        """
         body = f'<{action} xmlns="{service}">{inner}</{action}>'
+        self.gate.check()
+        try:
+            return self._login(path, body)
+        except NotAuthorized:
+            before, self._ahead = self._ahead or 0.0, self._skew()
+            if abs(self._ahead - before) < SKEW_S:
+                self.gate.pause(ODD_S)
+        try:
+            return self._login(path, body, sure=not self._proven)
+        except NotAuthorized:
+            if not self._proven:
+                self.gate.check()
+                raise
+        self._login(FIRST, f'<GetDeviceInformation xmlns="{DEVICE}"/>', sure=True)
+        raise Refused("the account has no right to do that")
+
+    def _login(self, path: str, body: str, *, sure: bool = False) -> ElementTree.Element:
+        """One try; the gate is told what became of it."""
         if self._ahead is None:
             self._ahead = self._skew()
-        try:
-            return self._post(path, body, signed=True)
-        except NotAuthorized:
-            before, self._ahead = self._ahead, self._skew()
-            if abs(self._ahead - before) < SKEW_S:
+        with self.gate.login(urgent=self.urgent) as login:
+            try:
+                answer = self._post(path, body, signed=True)
+            except NotAuthorized:
+                login.failed(sure=sure)
                 raise
-            return self._post(path, body, signed=True)
+            except Refused:
+                login.passed()
+                raise
+            login.passed()
+        self._proven = True
+        return answer
 
     def _skew(self) -> float:
         told = self._post(FIRST, f'<GetSystemDateAndTime xmlns="{DEVICE}"/>', signed=False)
