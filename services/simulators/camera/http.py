@@ -178,7 +178,7 @@ class Connection(BaseHTTPRequestHandler):
         length = self.headers.get("Content-Length", "")
         body, host = self.rfile.read(min(int(length), SOAP_BYTES) if length.isdigit() else 0), self.headers["Host"]
         with self.server.control:
-            self.server.delay(self.server.latency_s, self.server.spread_s if self.server.latency_s else 0.0)
+            self.server.delay(self.server.device.latency.control())
             answer = self.server.device.step(lambda: onvif.answer(body, host, clock()))
         self._send(answer, entry)
         if self.server.device.booting(clock()):
