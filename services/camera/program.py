@@ -13,6 +13,7 @@ from services.camera.scan.analysis import Pool
 from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
+from services.camera.video.channel import Channel
 from services.camera.watchdog import Watchdog, connector
 from services.errors import ConfigError
 from services.runner import Post
@@ -26,8 +27,9 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     view = eye(config)
     watchdog = Watchdog(config.brand, address)
     device = Device(connector(config.brand, address), post, turning=watchdog.tell)
+    channel = Channel(config.name, config.stream, address, config.kind, post)
     try:
-        service = CameraService(config, device, lambda: Pool(post, config.workers), view)
+        service = CameraService(config, device, lambda: Pool(post, config.workers), view, channel)
         try:
             yield service
         finally:
@@ -35,6 +37,7 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     finally:
         device.close()
         watchdog.close()
+        channel.close()
 
 
 def check(config: Config) -> None:

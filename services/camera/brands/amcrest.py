@@ -5,12 +5,13 @@ from __future__ import annotations
 import httpx
 
 from services.camera.address import Address
-from services.camera.brands.dahua import picture, ptz, replies, system
+from services.camera.brands.dahua import picture, ptz, replies, streams, system
 from services.camera.requests import (
     Away,
     Camera,
     ClearPreset,
     Direction,
+    FindStream,
     GetPicture,
     GotoPreset,
     Identify,
@@ -34,6 +35,7 @@ class Amcrest:
     """A Camera; `channel` None: found out by asking for the status with 1, then 0."""
 
     def __init__(self, address: Address, transport: httpx.BaseTransport | None = None) -> None:
+        self.address = address
         self.login = Login(address.user, address.password)
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
@@ -62,6 +64,8 @@ class Amcrest:
                 return self._picture()
             case SetPicture():
                 return self._set_picture(request)
+            case FindStream(source):
+                return streams.address(self.address, source)
             case Identify():
                 return self._identify()
             case Reboot():

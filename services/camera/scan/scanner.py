@@ -51,7 +51,7 @@ class Scanner:
     @property
     def kind(self) -> Literal["ceiling", "shelf"]:
         """How the camera is mounted."""
-        return self.config.mount.kind if self.config.mount else "ceiling"
+        return self.config.kind
 
     def check(self, order: ScanFor) -> None:
         """Refused when it cannot be done."""
