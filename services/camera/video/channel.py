@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 from services.bus import Message
 from services.camera.address import Address
-from services.camera.requests import StreamAddress
+from services.camera.requests import BadLogin, StreamAddress
 from services.camera.video import pictures
 from services.camera.video.newest import Newest, Upright
 from services.camera.video.proxy import Proxy
@@ -22,6 +22,7 @@ from services.camera.video.reader import Opener, Reader
 from services.camera.video.session import Session
 from services.camera.video.settings import StreamSettings
 from services.camera.video.timing import ADVICE, Exposure
+from services.camera.web.gate import Gate
 from services.camera.web.motion_jpeg import MotionJpeg
 from services.payloads import Stream
 from services.runner import Post
@@ -43,12 +44,14 @@ class Channel:
         address: Address,
         kind: Kind,
         post: Post,
+        gate: Gate,
         clock: Callable[[], float] = time.time,
     ) -> None:
         self.camera = camera
         self.settings = settings
         self.address = address
         self.post = post
+        self.gate = gate
         self.clock = clock
         self.rtsp, self.mjpeg = settings.rtsp, settings.mjpeg
         self.found: StreamAddress | None = None  # where the camera's moving picture is, when it has told
@@ -168,13 +171,20 @@ class Channel:
         if rtsp is not None:
             ways.append(lambda: self._rtsp(rtsp))
         if mjpeg is not None and self.settings.camera_mjpeg:
-            ways.append(lambda: MotionJpeg(mjpeg, self.address, self.clock))
+            ways.append(lambda: MotionJpeg(mjpeg, self.address, self.gate, self.clock))
         return tuple(ways)
 
     def _rtsp(self, url: str) -> Session:
         from services.camera.video.rtsp import Rtsp  # FFmpeg takes 30 MB: not while the stream is off
 
-        return Rtsp(url, self.address, self.clock)
+        with self.gate.login() as login:
+            try:
+                session = Rtsp(url, self.address, self.clock)
+            except BadLogin:
+                login.failed()
+                raise
+            login.passed()
+            return session
 
     def _own_url(self, proxy: Proxy) -> str:
         host = str(proxy.server_address[0])

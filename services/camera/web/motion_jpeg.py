@@ -14,6 +14,7 @@ from services.camera.video import pictures
 from services.camera.video.session import Arrival
 from services.camera.web.connection import connection
 from services.camera.web.digest import Login
+from services.camera.web.gate import Gate
 from services.errors import DeviceError
 
 PATIENCE = httpx.Timeout(4.0, connect=2.0)
@@ -31,11 +32,12 @@ class MotionJpeg:
         self,
         target: str,
         address: Address,
+        gate: Gate,
         clock: Callable[[], float] = time.time,
         transport: httpx.BaseTransport | None = None,
     ) -> None:
         self.clock = clock
-        self._http = connection(address, Login(address.user, address.password), transport)
+        self._http = connection(address, Login(address.user, address.password, gate), transport)
         try:
             self._answer = self._begin(target)
         except DeviceError:
