@@ -42,12 +42,12 @@ class RtspCamera:
 
 
 @contextmanager
-def rtsp_camera(port: int = 0) -> Iterator[RtspCamera]:
+def rtsp_camera(port: int = 0, password: str = PASSWORD) -> Iterator[RtspCamera]:
     """Skips where GStreamer's RTSP server is missing."""
     if find_spec("gi") is None:
         pytest.skip("apt-get install python3-gi gir1.2-gst-rtsp-server-1.0 gstreamer1.0-plugins-ugly")
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.camera.video.rtsp_camera", str(port), USER, PASSWORD],
+        [sys.executable, "-m", "tests.camera.video.rtsp_camera", str(port), USER, password],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stdout is not None
