@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from services import document
-from services.camera.address import Address
 from services.camera.device import Device
 from services.camera.places import Places
 from services.camera.scan.analysis import Pool
@@ -23,7 +22,7 @@ from services.vision.lens import Lens
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[CameraService]:
     """The service, with its threads to the camera; at the end a stop is sent and confirmed."""
-    address = Address(config.url, config.user, config.password, config.rtsp_port, config.channel)
+    address = config.address
     view = eye(config)
     watchdog = Watchdog(config.brand, address)
     gate = Gate(config.login_retry_s)

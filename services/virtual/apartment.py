@@ -121,9 +121,8 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         simulator = self.apartment.instances["simulated-camera"].config
         assert isinstance(simulator, CameraSimulator)
         behind = inside(simulator, self.now)
-        address = Address(config.url, config.user, config.password, config.rtsp_port, config.channel)
         gate = Gate(clock=self.clock, pause=lambda seconds: None)
-        link = Link(*(self._lane(behind, address, post, gate) for _ in range(2)))
+        link = Link(*(self._lane(behind, config.address, post, gate) for _ in range(2)))
         self.links.append(link)
         return CameraService(config, link, lambda: Inline(post), eye(config))
 

@@ -58,6 +58,11 @@ class Device:
         with self._lock:
             self.ptz.motors.place(pose, now)
 
+    def step(self, act: Callable[[], Answer]) -> Answer:
+        """Something that another program of the camera does, undisturbed by the others."""
+        with self._lock:
+            return act()
+
     def booting(self, now: float) -> bool:
         """Whether it is restarting and answers nobody."""
         return now < self.boots_until
@@ -75,10 +80,10 @@ class Device:
             "getVendor": ["vendor=Amcrest"],
         }
         if request.action == "reboot":
-            return self._reboot(now)
+            return self.reboot(now)
         return lines(facts[request.action]) if request.action in facts else refusal(profile)
 
-    def _reboot(self, now: float) -> Answer:
+    def reboot(self, now: float) -> Answer:
         """Presets and configuration stay; the motors return to where they are after power-on."""
         self.boots_until = now + self.profile.boot_s
         self.ptz.motors.place(Pose(*self.camera.starts_at), now)

@@ -19,10 +19,12 @@ from services.simulators.camera import events
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, Verdict
 from services.simulators.camera.messages import Answer, Request, read, refusal
+from services.simulators.camera.onvif.service import Onvif
 from services.simulators.camera.view.picture import Pictures, Stream
 
 IMAGE = "image/jpeg"
 LOG_LENGTH = 2000
+SOAP_BYTES = 1 << 20
 HEARTBEATS_S = (1.0, 60.0)
 ROOT = b"<html><head><title>WEB</title></head><body></body></html>"
 
@@ -67,6 +69,7 @@ class CameraServer(Port):
         self.running.set()
         self.control, self.snapshot, self._lock = Lock(), Lock(), Lock()
         self._open: set[socket.socket] = set()
+        self.onvif: Onvif | None = None
 
     def delay(self, seconds: float) -> None:
         """Waits as long as the camera needs, or until it is switched off."""
@@ -143,6 +146,8 @@ class Connection(BaseHTTPRequestHandler):
             return self._fail(fault, entry)
         if self.path == "/":
             return self._send(Answer(ROOT, content_type="text/html"), entry)
+        if self.path.startswith("/onvif/"):
+            return self._soap(entry)
         verdict = self.server.judge(self.command, self.path, self.headers.get("Authorization"))
         if verdict.passed:
             return self._serve(read(self.path), entry)
@@ -163,6 +168,20 @@ class Connection(BaseHTTPRequestHandler):
             answer = self.server.device.answer(request, self.server.clock())
         self._send(answer, entry)
         if self.server.device.booting(self.server.clock()):
+            self.server.drop()
+
+    def _soap(self, entry: dict[str, Any]) -> None:
+        """ONVIF checks logins itself, message by message."""
+        onvif, clock = self.server.onvif, self.server.clock
+        if onvif is None or self.command != "POST":
+            return self._send(Answer(b"", 404), entry)
+        length = self.headers.get("Content-Length", "")
+        body, host = self.rfile.read(min(int(length), SOAP_BYTES) if length.isdigit() else 0), self.headers["Host"]
+        with self.server.control:
+            self.server.delay(self.server.device.latency.control())
+            answer = self.server.device.step(lambda: onvif.answer(body, host, clock()))
+        self._send(answer, entry)
+        if self.server.device.booting(clock()):
             self.server.drop()
 
     def _snapshot(self, request: Request, entry: dict[str, Any]) -> None:

@@ -60,6 +60,7 @@ class Profile:
     daynight: Literal["VideoInOptions", "VideoInDayNight"] = "VideoInOptions"
     config_narrowing: bool = True  # a narrowed table name works; otherwise it gives an empty answer
     heartbeat: bool = True
+    onvif: bool = True  # it has the ONVIF services too
 
     latency_s: float = 0.3  # of each control request
     latency_spread_s: float = 0.1

@@ -15,6 +15,7 @@ from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, realm
 from services.simulators.camera.http import CameraServer
 from services.simulators.camera.latency import Latency
+from services.simulators.camera.onvif.service import Onvif
 from services.simulators.camera.settings import Config
 from services.simulators.camera.side_door import SideDoor
 from services.simulators.camera.view.picture import Pictures
@@ -84,7 +85,10 @@ def inside(config: Config, now: float) -> Inside:
 
 def _server(config: Config, clock: Callable[[], float]) -> CameraServer:
     behind = inside(config, clock())
-    return CameraServer((config.host, config.port), behind.device, behind.door, behind.pictures, clock)
+    server = CameraServer((config.host, config.port), behind.device, behind.door, behind.pictures, clock)
+    if behind.device.profile.onvif:
+        server.onvif = Onvif(behind.device, config.user, config.password.get_secret_value())
+    return server
 
 
 @contextmanager
