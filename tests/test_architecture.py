@@ -89,6 +89,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.bridge.images",
         "services.simulators.camera.",
     ),
+    "av": ("services.camera.video.rtsp",),
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),
@@ -106,6 +107,7 @@ DOORS: dict[str, tuple[str, ...]] = {
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
     "services.bus", "services.vision.", "services.camera.ptz.move", "services.camera.scan.search",
+    "services.camera.video.timing",
     "services.camera.brands.dahua.", "services.camera.discovery", "services.bridge.rules",
     "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
     "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",

@@ -12,6 +12,7 @@ from services.camera.scan.analysis import Pool
 from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
+from services.camera.video.channel import Channel
 from services.camera.watchdog import Watchdog, connector
 from services.camera.web.gate import Gate
 from services.errors import ConfigError
@@ -27,8 +28,9 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     watchdog = Watchdog(config.brand, address)
     gate = Gate(config.login_retry_s)
     device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell)
+    channel = Channel(config.name, config.stream, address, config.kind, post, gate)
     try:
-        service = CameraService(config, device, lambda: Pool(post, config.workers), view)
+        service = CameraService(config, device, lambda: Pool(post, config.workers), view, channel)
         try:
             yield service
         finally:
@@ -36,6 +38,7 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     finally:
         device.close()
         watchdog.close()
+        channel.close()
 
 
 def check(config: Config) -> None:

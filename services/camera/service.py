@@ -30,6 +30,8 @@ from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
 from services.camera.scan.sightings import Eye
 from services.camera.settings import Config
+from services.camera.video.channel import ASKED, Channel
+from services.camera.video.feed import Feed
 from services.errors import BadMessage
 from services.payloads import Order, OrderState, PositionSet
 
@@ -40,7 +42,14 @@ FRESH_S = 2.0  # a reading as old as this still tells where a camera at rest loo
 class CameraService:
     """A Service (`runner.py`). `analyst` makes the one that looks at frames, a new one for each scan."""
 
-    def __init__(self, config: Config, sender: Sender, analyst: Callable[[], Analyst], eye: Eye) -> None:
+    def __init__(
+        self,
+        config: Config,
+        sender: Sender,
+        analyst: Callable[[], Analyst],
+        eye: Eye,
+        channel: Channel | None = None,
+    ) -> None:
         self.config = config
         self.subscribes = tuple(
             topic.filter_for(cam=config.name)
@@ -67,7 +76,9 @@ class CameraService:
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
         self.scanner = Scanner(config, self.skill, eye, analyst, self.bulletin, self.places)
-        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin)
+        self.bulletin.video = channel
+        self.feed = Feed(config, self.health, channel, publish)
+        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed)
         self._polling = False
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
@@ -76,6 +87,8 @@ class CameraService:
             self._reply(message.value, now)
         elif message.topic == ANALYSED and isinstance(message.value, Analysed):
             self.scanner.take(message.value)
+        elif message.topic == ASKED:
+            self.stage.begin(self.feed.shown(), now, _nobody)
         else:
             try:
                 read = topics.read(message, now)
@@ -102,7 +115,8 @@ class CameraService:
         """Wakes the plans, and publishes what has changed."""
         if not self._polling:
             self._polling = True
-            self.stage.begin(self._poll(now), now, _nobody)
+            for plan in (self._poll(now), self.feed.run(now), self.feed.every_so_often(now)):
+                self.stage.begin(plan, now, _nobody)
         self.stage.tick(now)
         self.motors.tick(now)
         self.health.moving = self.motors.busy
@@ -138,6 +152,7 @@ class CameraService:
     def _take_picture(self, picture: Picture) -> None:
         """The motors follow the picture: when its options changed, which way they turn is to be seen anew."""
         old, self.scanner.picture = self.scanner.picture, picture
+        self.feed.turned(picture)
         if (picture.flip, picture.mirror) != (old.flip, old.mirror):
             self.skill.forget_senses(flip=picture.flip, mirror=picture.mirror)
 
@@ -160,7 +175,7 @@ class CameraService:
     def _read(self, read: topics.Read, now: float) -> None:
         payload = read.payload
         if read.topic is topics.CAMERA_SNAPSHOT_GET:
-            self.stage.begin(self.chores.snapshot(), now, _nobody)
+            self.stage.begin(self.feed.published(), now, _nobody)
         elif read.topic in (topics.HOMEASSISTANT_ENTITY, topics.HOMEASSISTANT_STATUS):
             self.discovery.hear(read)
         elif isinstance(payload, PositionSet):
@@ -210,6 +225,8 @@ class CameraService:
             self._goal(command)
         elif isinstance(command, orders.RemovePlace):
             self.places.get(command.place)
+        elif isinstance(command, orders.Broadcast):
+            self.feed.check(command)
         elif isinstance(command, ScanFor):
             self.scanner.check(command)
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import httpx
 
 from services.camera.address import Address
-from services.camera.brands.dahua import picture, ptz, replies, system
+from services.camera.brands.dahua import picture, ptz, replies, streams, system
 from services.camera.requests import (
     Away,
     Camera,
     ClearPreset,
     Direction,
+    FindStream,
     GetPicture,
     GotoPreset,
     Identify,
@@ -42,6 +43,7 @@ class Amcrest:
         *,
         urgent: bool = False,
     ) -> None:
+        self.address = address
         self.login = Login(address.user, address.password, gate or Gate(), urgent=urgent)
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
@@ -70,6 +72,8 @@ class Amcrest:
                 return self._picture()
             case SetPicture():
                 return self._set_picture(request)
+            case FindStream(source):
+                return streams.address(self.address, source)
             case Identify():
                 return self._identify()
             case Reboot():
