@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from services import topics
-from services.bus import Message
+from services.bus import LOST_TOPIC, Message
 from services.camera import answers as life
 from services.camera import orders
 from services.camera.answers import Answers, Job
@@ -61,6 +61,7 @@ class CameraService:
                 topics.HOMEASSISTANT_STATUS,
             )
         )
+        self.subscribes += (LOST_TOPIC,)
         self.due: float | None = 0.0
         self.counters: dict[str, int] = {"requests": 0, "failed_requests": 0, "frames": 0}
         self._out: list[Message] = []
@@ -87,6 +88,8 @@ class CameraService:
             self._reply(message.value, now)
         elif message.topic == ANALYSED and isinstance(message.value, Analysed):
             self.scanner.take(message.value)
+        elif message.topic == LOST_TOPIC:  # nobody could end a motion any more
+            self.motors.give_up("the connection to the broker was lost", now)
         elif message.topic == ASKED:
             self.stage.begin(self.feed.shown(), now, _nobody)
         else:

@@ -27,7 +27,7 @@ from services.camera.requests import (
     Status,
     Stop,
 )
-from services.camera.web.connection import COMMAND, SNAPSHOT, connection, fetch
+from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
 
@@ -82,8 +82,8 @@ class Amcrest:
     def _get(self, target: str, timeout: httpx.Timeout = COMMAND) -> httpx.Response:
         return replies.check(fetch(self.http, target, timeout))
 
-    def _command(self, target: str) -> object:
-        body = self._get(target).text
+    def _command(self, target: str, timeout: httpx.Timeout = COMMAND) -> object:
+        body = self._get(target, timeout).text
         if not replies.is_ok(body):
             raise Refused(f"expected OK from the camera, got {' '.join(body.split())[:80]!r}")
         return None
@@ -100,7 +100,7 @@ class Amcrest:
         directions = [known] if known is not None and not request.every else list(Direction)
         for direction in directions:
             try:
-                self._command(ptz.stop(direction, channel))
+                self._command(ptz.stop(direction, channel), STOP)
             except Refused as error:  # firmware that refuses to stop what does not run
                 refused.append(error)
         if len(refused) == len(directions):
