@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field, SecretStr, field_validator
+from pydantic import Field, SecretStr, field_validator, model_validator
 
 from services.camera.ptz.goal import Limits
 from services.section import Section
 from services.vision.frames import Mount
 
 Pair = tuple[float, float]
+LOW = {"diagnostics": False, "alarm": False, "frames": 1}  # for a small computer, as the report ran its Raspberry Pi
 
 
 class MarkerSizes(Section):
@@ -53,6 +54,7 @@ class Config(Section):
 
     name: str = "ip1"
     folder: Path = Path()
+    profile: Literal["full", "low"] = "full"  # "low": what is not given is as in LOW
     brand: str = "amcrest"  # a module of `camera/brands/`
     url: str
     rtsp_port: int = Field(default=554, ge=1, le=65535)
@@ -65,6 +67,9 @@ class Config(Section):
     dictionary: str = "DICT_5X5_1000"
     markers: MarkerSizes = MarkerSizes()
     targets: tuple[int, ...] = ()
+    diagnostics: bool = True  # say how it fares, once a second
+    alarm: bool = True  # listen to the camera's own motion alarm
+    discovery: bool = False  # tell Home Assistant and openHAB what there is (`homeassistant/#`)
     picture: PictureOptions = PictureOptions()
     pan_dead_arc: Pair = (179.0, 186.0)  # readings that the camera cannot reach, degrees
     tilt_range: Pair = (-10.0, 108.0)
@@ -76,6 +81,13 @@ class Config(Section):
     stop_early: bool = True  # a scan ends when every target was seen where it shows best
     move_timeout_s: float = Field(default=60.0, gt=1, le=600)
     workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
+
+    @model_validator(mode="before")
+    @classmethod
+    def profile_gives_what_is_not_said(cls, values: Any) -> Any:
+        if isinstance(values, dict) and values.get("profile") == "low":
+            return {**LOW, **values}
+        return values
 
     @field_validator("url")
     @classmethod
