@@ -153,6 +153,12 @@ class Reboot:
     rank = Rank.CONFIG
 
 
+class Errand:
+    """Base of the requests about the device itself (`errands.py`); a brand may refuse any of them."""
+
+    rank = Rank.CONFIG
+
+
 Request = (
     Start
     | Stop
@@ -165,6 +171,7 @@ Request = (
     | SetPicture
     | Identify
     | Reboot
+    | Errand
 )
 
 
@@ -194,6 +201,15 @@ class Identity:
     model: str
     serial: str
     version: str
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that the camera noticed by itself: `action` Start, Stop, Pulse or State; no code: it is alive."""
+
+    code: str
+    action: str
+    index: int = 0
 
 
 @dataclass(frozen=True)
