@@ -24,7 +24,7 @@ from services.vision.lens import Lens
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[CameraService]:
     """The service, with its threads to the camera; at the end a stop is sent and confirmed."""
-    address = Address(config.url, config.user, config.password, config.rtsp_port, config.channel)
+    address = config.address
     view = eye(config)
     watchdog = Watchdog(config.brand, address)
     gate = Gate(config.login_retry_s)

@@ -8,6 +8,7 @@ from zoneinfo import available_timezones
 
 from pydantic import Field, SecretStr, field_validator, model_validator
 
+from services.camera.address import Address
 from services.camera.ptz.goal import Limits
 from services.section import Section
 from services.vision.frames import Mount
@@ -138,6 +139,14 @@ class Config(Section):
         if pair[0] >= pair[1]:
             raise ValueError(f"expected [low, high], got {list(pair)}")
         return pair
+
+    @property
+    def address(self) -> Address:
+        """What every brand is given."""
+        return Address(
+            self.url, self.user, self.password, self.rtsp_port, self.channel,
+            self.pan_dead_arc, self.tilt_range, self.zoom_range,
+        )  # fmt: skip
 
     @property
     def limits(self) -> Limits:
