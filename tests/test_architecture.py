@@ -81,6 +81,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.virtual.wire",
         "services.camera.brands.",
         "services.camera.web.",
+        "services.camera.probe.",
         "services.openhab.rest",
     ),
     "cv2": (
@@ -93,7 +94,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),
     "typer": ("services.__main__",),
-    "rich": ("services.__main__", "services.demo"),
+    "rich": ("services.__main__", "services.demo", "services.camera.probe."),
     "starlette": ("services.dashboard.http",),
     "uvicorn": ("services.dashboard.http",),
     "pytest": ("services.pytest_plugin",),
@@ -106,7 +107,8 @@ DOORS: dict[str, tuple[str, ...]] = {
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
     "services.bus", "services.vision.", "services.camera.ptz.move", "services.camera.scan.search",
-    "services.camera.brands.dahua.", "services.camera.discovery", "services.bridge.rules",
+    "services.camera.brands.dahua.", "services.camera.probe.findings", "services.camera.probe.anonymous",
+    "services.camera.discovery", "services.bridge.rules",
     "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
     "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",
     "services.simulators.devices", "services.simulators.life",
