@@ -21,7 +21,6 @@ from services.client import FINAL, Client
 from services.config import Instance, load
 from services.payloads import OrderResult, PositionSet
 from services.runner import Post, Runner
-from services.simulators.camera.profiles import PROFILES
 from services.simulators.camera.program import Inside, inside
 from services.simulators.camera.settings import Config as CameraSimulator
 from services.topics import CAMERA_ORDER_RESULT, CAMERA_STATUS, SERVICE_STATUS, read
@@ -123,10 +122,10 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         assert isinstance(simulator, CameraSimulator)
         behind = inside(simulator, self.now)
         gate = Gate(clock=self.clock, pause=lambda seconds: None)
-        link = Link(*(self._lane(simulator, behind, config.address, post, gate) for _ in range(2)))
+        link = Link(*(self._lane(behind, config.address, post, gate) for _ in range(2)))
         self.links.append(link)
         return CameraService(config, link, lambda: Inline(post), eye(config))
 
-    def _lane(self, simulator: CameraSimulator, behind: Inside, address: Address, post: Post, gate: Gate) -> Lane:
-        wire = Wire(behind, PROFILES[simulator.profile], simulator.seed)
+    def _lane(self, behind: Inside, address: Address, post: Post, gate: Gate) -> Lane:
+        wire = Wire(behind)
         return Lane(Amcrest(address, wire, gate), wire, post, self.clock)

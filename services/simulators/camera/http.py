@@ -11,7 +11,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from random import Random
 from socketserver import TCPServer
 from threading import Event, Lock
 from typing import Any
@@ -65,20 +64,17 @@ class CameraServer(Port):
     ) -> None:
         super().__init__(address, Connection)
         self.device, self.door, self.pictures, self.clock = device, door, pictures, clock
-        self.latency_s, self.spread_s = device.profile.latency_s, device.profile.latency_spread_s
-        self.snapshot_s = device.profile.snapshot_s
         self.closing, self.faults, self.log = Event(), Faults(), deque[dict[str, Any]](maxlen=LOG_LENGTH)
         self.running = Event()  # cleared while frozen
         self.running.set()
         self.control, self.snapshot, self._lock = Lock(), Lock(), Lock()
         self._open: set[socket.socket] = set()
         self.onvif: Onvif | None = None
-        self._rng = Random(1)
 
-    def delay(self, seconds: float, spread: float = 0.0) -> None:
+    def delay(self, seconds: float) -> None:
         """Waits as long as the camera needs, or until it is switched off."""
         if seconds > 0:
-            self.closing.wait(seconds + self._rng.uniform(-spread, spread))
+            self.closing.wait(seconds)
 
     def judge(self, method: str, target: str, header: str | None) -> Verdict:
         """The door's verdict, one request at a time."""
@@ -166,12 +162,10 @@ class Connection(BaseHTTPRequestHandler):
         how(request, entry)
 
     def _control(self, request: Request, entry: dict[str, Any]) -> None:
-        """One at a time. A command acts when it has been processed; a status tells how it was when asked."""
+        """One at a time, and it acts when it has been processed."""
         with self.server.control:
-            reads = request.action.startswith("get")
-            answer = self.server.device.answer(request, self.server.clock()) if reads else None
-            self.server.delay(self.server.latency_s, self.server.spread_s if self.server.latency_s else 0.0)
-            answer = answer or self.server.device.answer(request, self.server.clock())
+            self.server.delay(self.server.device.latency.control())
+            answer = self.server.device.answer(request, self.server.clock())
         self._send(answer, entry)
         if self.server.device.booting(self.server.clock()):
             self.server.drop()
@@ -184,7 +178,7 @@ class Connection(BaseHTTPRequestHandler):
         length = self.headers.get("Content-Length", "")
         body, host = self.rfile.read(min(int(length), SOAP_BYTES) if length.isdigit() else 0), self.headers["Host"]
         with self.server.control:
-            self.server.delay(self.server.latency_s, self.server.spread_s if self.server.latency_s else 0.0)
+            self.server.delay(self.server.device.latency.control())
             answer = self.server.device.step(lambda: onvif.answer(body, host, clock()))
         self._send(answer, entry)
         if self.server.device.booting(clock()):
@@ -195,7 +189,7 @@ class Connection(BaseHTTPRequestHandler):
         if not self.server.snapshot.acquire(blocking=False):
             return self._send(refusal(self.server.device.profile), entry)
         try:
-            self.server.delay(self.server.snapshot_s if self.server.latency_s else 0.0)
+            self.server.delay(self.server.device.latency.snapshot())
             data = self.server.pictures.jpeg("MainFormat", self.server.clock())
         finally:
             self.server.snapshot.release()
