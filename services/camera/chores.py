@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from services import topics
-from services.camera import orders
+from services.camera import commands, orders
 from services.camera.bulletin import Bulletin
 from services.camera.health import Health
+from services.camera.looks import Looks
 from services.camera.orders import Command
 from services.camera.places import Places
 from services.camera.plan import Plan, ask, attempt, wait
@@ -25,6 +26,7 @@ from services.camera.requests import (
     Status,
 )
 from services.camera.scan.scanner import Scanner
+from services.camera.sound.takes import Takes
 from services.camera.video import pictures
 from services.payloads import Place
 
@@ -36,11 +38,13 @@ UP_S = 180.0  # 40 to 105 s were seen
 class Chores:
     """Makes the plan for each of these orders."""
 
-    def __init__(self, places: Places, scanner: Scanner, health: Health, bulletin: Bulletin) -> None:
+    def __init__(self, places: Places, scanner: Scanner, health: Health, bulletin: Bulletin, takes: Takes) -> None:
         self.places = places
         self.scanner = scanner
         self.health = health
         self.bulletin = bulletin
+        self.looks = Looks(bulletin.facts)
+        self.takes = takes
         self._plans: dict[type, Callable[[Any, float], Plan[None]]] = {
             orders.SavePlace: self._save,
             orders.RemovePlace: self._remove,
@@ -48,6 +52,10 @@ class Chores:
             orders.Targets: self._targets,
             orders.Routine: self._routine,
             orders.Options: self._options,
+            commands.VideoMode: lambda order, now: self.looks.mode(order),
+            commands.HideLens: lambda order, now: self.looks.privacy(order),
+            commands.RecordSound: lambda order, now: self.takes.record(order, now),
+            commands.PlaySound: lambda order, now: self.takes.play(order, now),
             orders.Restart: self._restart,
         }
 
