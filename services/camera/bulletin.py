@@ -14,6 +14,7 @@ from services.camera.health import Health
 from services.camera.places import Places
 from services.camera.requests import Identity, Reading, Refused
 from services.camera.upkeep import Facts
+from services.camera.video.channel import Channel
 from services.errors import ConfigError
 from services.payloads import Diagnostic, Position, Stream
 
@@ -38,6 +39,7 @@ class Bulletin:
         self.reading: Reading | None = None
         self.turning = False
         self.identity: Identity | None = None
+        self.video: Channel | None = None
         self._read_at = self._turned_at = 0.0
         self._said: dict[topics.Topic, BaseModel] = {}
         self._position_at = 0.0
@@ -82,11 +84,11 @@ class Bulletin:
         """Publishes what has changed, and the health once a second."""
         self.say(topics.CAMERA_STATUS, self.health.status)
         self._say_position(now)
+        self.say(topics.CAMERA_STREAM, self.video.state if self.video else Stream(rtsp=False, mjpeg=False, url=""))
         if now >= self.due:
             self.due = now + EVERY_S
             self._reload()
             self.say(topics.CAMERA_PLACES, self.places.payload)
-            self.say(topics.CAMERA_STREAM, Stream(rtsp=False, mjpeg=False, url=""))
             if self.diagnostics:
                 component = f"camera/{self.camera}"
                 self.publish(topics.DIAGNOSTICS.message(self._diagnostic(counters), component=component))
@@ -112,10 +114,12 @@ class Bulletin:
             "http_latency_ms": f"{1000 * self.health.latency:.0f}",
             "model": identity.model,
             "firmware": identity.version,
+            **(self.video.values() if self.video else {}),
             **{name: str(count) for name, count in counters.items()},
             **self.facts.values,
         }
-        complaints = self.facts.complaints.values()
+        seen = self.video.complaint() if self.video else ""
+        complaints = [*filter(None, [seen]), *self.facts.complaints.values()]
         return Diagnostic(
             level=max(LEVELS.get(self.health.state, 2), 1 if complaints else 0),
             message="; ".join([": ".join(filter(None, (self.health.state, self.health.reason))), *complaints]),

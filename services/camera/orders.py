@@ -20,10 +20,6 @@ DIRECTIONS = {
     direction.name.replace("_", "").lower(): direction for direction in Direction if not direction.name.startswith("Z")
 }
 YES, NO = ("true", "on", "1"), ("false", "off", "0")
-NOT_AVAILABLE = {
-    "RTSP": "this version takes its pictures as snapshots",
-    "MJPEG": "this version takes its pictures as snapshots",
-}
 
 
 @dataclass(frozen=True)
@@ -113,12 +109,20 @@ class Options:
 
 
 @dataclass(frozen=True)
+class Broadcast:
+    """Switch a stream; None leaves as it is."""
+
+    rtsp: bool | None = None
+    mjpeg: bool | None = None
+
+
+@dataclass(frozen=True)
 class Restart:
     """Reboot the camera."""
 
 
 Motor = GotoPlace | LookAt | MoveBy | ScanFor
-Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Restart  # the camera, apart from its motors
+Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Broadcast | Restart  # all but its motors
 Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Itself
 
 
@@ -234,13 +238,6 @@ def _restart(value: Any) -> Command:
     return Restart()
 
 
-def _refuse(reason: str) -> Callable[[Any], Command]:
-    def refuse(value: Any) -> Command:
-        raise ValueError(f"not available: {reason}")
-
-    return refuse
-
-
 READERS: dict[str, Callable[[Any], Command]] = {
     "Goto": lambda value: GotoPlace(name_of(_text(value))),
     "SaveAs": lambda value: SavePlace(name_of(_text(value))),
@@ -253,6 +250,8 @@ READERS: dict[str, Callable[[Any], Command]] = {
     "AddTarget": lambda value: Targets("add", _markers(value)),
     "RemoveTarget": lambda value: Targets("remove", _markers(value)),
     "SetRoutine": _routine,
+    "RTSP": lambda value: Broadcast(rtsp=_flag(value)),
+    "MJPEG": lambda value: Broadcast(mjpeg=_flag(value)),
     "Mirror": lambda value: Options(SetPicture(mirror=_flag(value))),
     "Flip": lambda value: Options(SetPicture(flip=_flag(value))),
     "VideoMode": lambda value: VideoMode.read(_text(value)),
@@ -260,7 +259,6 @@ READERS: dict[str, Callable[[Any], Command]] = {
     "AudioRec": lambda value: RecordSound.read(_text(value)),
     "AudioPlay": lambda value: PlaySound.read(_text(value)),
     "Reboot": _restart,
-    **{key: _refuse(reason) for key, reason in NOT_AVAILABLE.items()},
 }
 KEYS = {name.lower(): (name, reader) for name, reader in READERS.items()}
 

@@ -15,6 +15,7 @@ from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
 from services.camera.sound.desk import Desk
+from services.camera.video.channel import Channel
 from services.camera.watchdog import Watchdog, brand, connector
 from services.camera.web.gate import Gate
 from services.errors import ConfigError
@@ -32,9 +33,10 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell)
     made_sound = getattr(brand(config.brand), "sound", None)
     sender = Desk(device, made_sound(address, gate) if made_sound else None, post)
+    channel = Channel(config.name, config.stream, address, config.kind, post, gate)
     listener = _listener(config, address, gate, post)
     try:
-        service = CameraService(config, sender, lambda: Pool(post, config.workers), view)
+        service = CameraService(config, sender, lambda: Pool(post, config.workers), view, channel)
         try:
             yield service
         finally:
@@ -44,6 +46,7 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
             listener.close()
         sender.close()
         watchdog.close()
+        channel.close()
 
 
 def _listener(config: Config, address: Address, gate: Gate, post: Post) -> Listener | None:

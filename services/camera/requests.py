@@ -140,6 +140,14 @@ class SetPicture:
 
 
 @dataclass(frozen=True)
+class FindStream:
+    """Where the moving picture is; the answer is a StreamAddress, or None when the camera has none."""
+
+    source: Literal["main", "sub"]
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
 class Identify:
     """Who are you; the answer is an Identity."""
 
@@ -169,6 +177,7 @@ Request = (
     | Snapshot
     | GetPicture
     | SetPicture
+    | FindStream
     | Identify
     | Reboot
     | Errand
@@ -201,6 +210,14 @@ class Identity:
     model: str
     serial: str
     version: str
+
+
+@dataclass(frozen=True)
+class StreamAddress:
+    """Addresses of a camera's moving picture, never with a password in them; `mjpeg` is a path of its HTTP server."""
+
+    rtsp: str | None
+    mjpeg: str | None = None
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pydantic import Field, SecretStr, field_validator, model_validator
 
 from services.camera.address import Address
 from services.camera.ptz.goal import Limits
+from services.camera.video.settings import SnapshotSettings, StreamSettings
 from services.section import Section
 from services.vision.frames import Mount
 
@@ -109,6 +110,9 @@ class Config(Section):
     settle_s: float = Field(default=0.6, ge=0, le=10)  # from rest to the first frame: the picture's own delay
     stop_early: bool = True  # a scan ends when every target was seen where it shows best
     move_timeout_s: float = Field(default=60.0, gt=1, le=600)
+    stream: StreamSettings = StreamSettings()
+    snapshot: SnapshotSettings = SnapshotSettings()
+    scan_pictures: Literal["snapshot", "stream"] = "snapshot"  # what a scan looks at, where a stream is on
     workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
 
     @model_validator(mode="before")
@@ -152,3 +156,8 @@ class Config(Section):
     def limits(self) -> Limits:
         """Where this camera can look."""
         return Limits(self.pan_dead_arc, self.tilt_range, self.zoom_range)
+
+    @property
+    def kind(self) -> Literal["ceiling", "shelf"]:
+        """How the camera is mounted."""
+        return self.mount.kind if self.mount else "ceiling"

@@ -6,13 +6,14 @@ import httpx
 
 from services.camera.address import Address
 from services.camera.alarm.listener import Ear
-from services.camera.brands.dahua import errands, picture, ptz, replies, system
+from services.camera.brands.dahua import errands, picture, ptz, replies, streams, system
 from services.camera.requests import (
     Away,
     Camera,
     ClearPreset,
     Direction,
     Errand,
+    FindStream,
     GetPicture,
     GotoPreset,
     Identify,
@@ -29,7 +30,7 @@ from services.camera.requests import (
     Stop,
 )
 from services.camera.sound.desk import Sound
-from services.camera.web.connection import COMMAND, SNAPSHOT, connection, fetch
+from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch
 from services.camera.web.dahua import DahuaEar, DahuaSound
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
@@ -46,6 +47,7 @@ class Amcrest:
         *,
         urgent: bool = False,
     ) -> None:
+        self.address = address
         self.login = Login(address.user, address.password, gate or Gate(), urgent=urgent)
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
@@ -74,6 +76,8 @@ class Amcrest:
                 return self._picture()
             case SetPicture():
                 return self._set_picture(request)
+            case FindStream(source):
+                return streams.address(self.address, source)
             case Identify():
                 return self._identify()
             case Reboot():
@@ -84,8 +88,8 @@ class Amcrest:
     def _get(self, target: str, timeout: httpx.Timeout = COMMAND) -> httpx.Response:
         return replies.check(fetch(self.http, target, timeout))
 
-    def _command(self, target: str) -> object:
-        body = self._get(target).text
+    def _command(self, target: str, timeout: httpx.Timeout = COMMAND) -> object:
+        body = self._get(target, timeout).text
         if not replies.is_ok(body):
             raise Refused(f"expected OK from the camera, got {' '.join(body.split())[:80]!r}")
         return None
@@ -102,7 +106,7 @@ class Amcrest:
         directions = [known] if known is not None and not request.every else list(Direction)
         for direction in directions:
             try:
-                self._command(ptz.stop(direction, channel))
+                self._command(ptz.stop(direction, channel), STOP)
             except Refused as error:  # firmware that refuses to stop what does not run
                 refused.append(error)
         if len(refused) == len(directions):
