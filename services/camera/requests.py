@@ -161,6 +161,12 @@ class Reboot:
     rank = Rank.CONFIG
 
 
+class Errand:
+    """Base of the requests about the device itself (`errands.py`); a brand may refuse any of them."""
+
+    rank = Rank.CONFIG
+
+
 Request = (
     Start
     | Stop
@@ -174,6 +180,7 @@ Request = (
     | FindStream
     | Identify
     | Reboot
+    | Errand
 )
 
 
@@ -211,6 +218,15 @@ class StreamAddress:
 
     rtsp: str | None
     mjpeg: str | None = None
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that the camera noticed by itself: `action` Start, Stop, Pulse or State; no code: it is alive."""
+
+    code: str
+    action: str
+    index: int = 0
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from services import topics
-from services.bus import Message
+from services.bus import LOST_TOPIC, Message
 from services.camera import answers as life
 from services.camera import orders
+from services.camera.alarm.listener import HEARD, Heard
+from services.camera.alarm.motion import MotionWatch
 from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
 from services.camera.chores import WITHOUT_CAMERA, Chores
@@ -61,6 +63,7 @@ class CameraService:
                 topics.HOMEASSISTANT_STATUS,
             )
         )
+        self.subscribes += (LOST_TOPIC,)
         self.due: float | None = 0.0
         self.counters: dict[str, int] = {"requests": 0, "failed_requests": 0, "frames": 0}
         self._out: list[Message] = []
@@ -79,14 +82,19 @@ class CameraService:
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
         self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed)
+        self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=config.alarm)
         self._polling = False
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
         """Takes a reply, an analysed frame, or an order."""
         if message.topic == REPLY and isinstance(message.value, Reply):
             self._reply(message.value, now)
+        elif message.topic == HEARD and isinstance(message.value, Heard):
+            self.motion.take(message.value)
         elif message.topic == ANALYSED and isinstance(message.value, Analysed):
             self.scanner.take(message.value)
+        elif message.topic == LOST_TOPIC:  # nobody could end a motion any more
+            self.motors.give_up("the connection to the broker was lost", now)
         elif message.topic == ASKED:
             self.stage.begin(self.feed.shown(), now, _nobody)
         else:
@@ -122,10 +130,21 @@ class CameraService:
         self.health.moving = self.motors.busy
         self.counters["frames"] = self.scanner.frames
         self.scanner.tick(now)
+        self._watch_motion(now)
         self.bulletin.tick(now, self.counters)
         self.discovery.tick(self.bulletin.identity, self.places.named)
         self.due = min(time for time in (self.bulletin.due, self.stage.due) if time is not None)
         return self._flush()
+
+    def _watch_motion(self, now: float) -> None:
+        turning = self.motors.busy or self.bulletin.turning
+        motion = self.motion.tick(now, turning=turning, online=self.health.online)
+        if motion is not None:
+            self.bulletin.say(topics.CAMERA_MOTION, motion)
+
+    def _begin(self, plan: Plan[None], now: float) -> None:
+        """A plan whose end nobody waits for."""
+        self.stage.begin(plan, now, _nobody)
 
     def close(self) -> None:
         """Ends the processes of a scan that is under way."""

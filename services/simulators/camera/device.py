@@ -10,7 +10,7 @@ from threading import RLock
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.events import Events
 from services.simulators.camera.latency import Latency
-from services.simulators.camera.messages import OK, Answer, Request, lines, refusal
+from services.simulators.camera.messages import OK, Answer, Request, lines, refusal, refuses_brackets
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.profiles import Profile
 from services.simulators.camera.ptz import Ptz
@@ -36,10 +36,13 @@ class Device:
             "configManager": self._config_manager,
             "eventManager": self._event_manager,
             "ptz": self.ptz.answer,
+            "ptzBase": self.ptz.answer,
         }
 
     def answer(self, request: Request, now: float) -> Answer:
         """One request with a short answer."""
+        if refuses_brackets(self.profile, request.target):
+            return Answer(b"Error\r\nBad Request!\r\n", 400)
         with self._lock:
             program = self._programs.get(request.cgi)
             return program(request, now) if program else Answer(b"", 404)
@@ -47,6 +50,7 @@ class Device:
     def motion(self, now: float) -> tuple[Pose, Pose]:
         """The true pose, and how fast each reading changes (degrees/s, levels/s)."""
         with self._lock:
+            self.ptz.rounds.advance(now)
             return self.ptz.motors.pose(now), self.ptz.motors.rates(now)
 
     def place(self, pose: Pose, now: float) -> None:
@@ -91,6 +95,8 @@ class Device:
         return lines([f"result={time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(now))}"])
 
     def _config_manager(self, request: Request, now: float) -> Answer:
+        if request.action == "getTours":
+            return self.ptz.list_tours()
         if request.action == "setConfig":
             pairs = [(key, value) for key, value in request.query if key != "action"]
             return OK if self.tables.write(pairs) else refusal(self.profile)

@@ -41,6 +41,12 @@ def read(target: str) -> Request:
     return Request(target, cgi, tuple((unquote(key), unquote(value)) for key, _, value in pairs))
 
 
+def refuses_brackets(profile: Profile, target: str) -> bool:
+    """Whether this firmware does not read the brackets of a target as they are spelt."""
+    wrong = {"raw": ("%5b", "%5d"), "encoded": ("[", "]"), "both": ()}[profile.brackets]
+    return any(spelling in target.lower() for spelling in wrong)
+
+
 @dataclass(frozen=True)
 class Answer:
     """An answer with a body of known length."""
