@@ -90,6 +90,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.bridge.images",
         "services.simulators.camera.",
     ),
+    "av": ("services.camera.video.rtsp",),
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),
@@ -107,6 +108,7 @@ DOORS: dict[str, tuple[str, ...]] = {
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
     "services.bus", "services.vision.", "services.camera.ptz.move", "services.camera.scan.search",
+    "services.camera.video.timing",
     "services.camera.brands.dahua.", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules",
     "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",

@@ -13,6 +13,7 @@ from services.camera.device import same
 from services.camera.health import Health
 from services.camera.places import Places
 from services.camera.requests import Identity, Reading, Refused
+from services.camera.video.channel import Channel
 from services.errors import ConfigError
 from services.payloads import Diagnostic, Position, Stream
 
@@ -36,6 +37,7 @@ class Bulletin:
         self.reading: Reading | None = None
         self.turning = False
         self.identity: Identity | None = None
+        self.video: Channel | None = None
         self._read_at = 0.0
         self._said: dict[topics.Topic, BaseModel] = {}
         self._position_at = 0.0
@@ -74,11 +76,11 @@ class Bulletin:
         """Publishes what has changed, and the health once a second."""
         self.say(topics.CAMERA_STATUS, self.health.status)
         self._say_position(now)
+        self.say(topics.CAMERA_STREAM, self.video.state if self.video else Stream(rtsp=False, mjpeg=False, url=""))
         if now >= self.due:
             self.due = now + EVERY_S
             self._reload()
             self.say(topics.CAMERA_PLACES, self.places.payload)
-            self.say(topics.CAMERA_STREAM, Stream(rtsp=False, mjpeg=False, url=""))
             if self.diagnostics:
                 component = f"camera/{self.camera}"
                 self.publish(topics.DIAGNOSTICS.message(self._diagnostic(counters), component=component))
@@ -104,11 +106,14 @@ class Bulletin:
             "http_latency_ms": f"{1000 * self.health.latency:.0f}",
             "model": identity.model,
             "firmware": identity.version,
+            **(self.video.values() if self.video else {}),
             **{name: str(count) for name, count in counters.items()},
         }
+        message = ": ".join(part for part in (self.health.state, self.health.reason) if part)
+        complaint = self.video.complaint() if self.video else ""
         return Diagnostic(
-            level=LEVELS.get(self.health.state, 2),
-            message=": ".join(part for part in (self.health.state, self.health.reason) if part),
+            level=max(LEVELS.get(self.health.state, 2), int(complaint != "")),
+            message="; ".join(part for part in (message, complaint) if part),
             values=values,
             hardware_id=identity.serial or self.camera,
         )

@@ -21,8 +21,6 @@ DIRECTIONS = {
 MODES: dict[str, Mode] = {"color": "color", "bw": "bw", "auto": "auto"}
 YES, NO = ("true", "on", "1"), ("false", "off", "0")
 NOT_AVAILABLE = {
-    "RTSP": "this version takes its pictures as snapshots",
-    "MJPEG": "this version takes its pictures as snapshots",
     "AudioRec": "this version has no audio",
     "AudioPlay": "this version has no audio",
     "Privacy": "this version has no privacy mode",
@@ -116,12 +114,22 @@ class Options:
 
 
 @dataclass(frozen=True)
+class Broadcast:
+    """Switch a stream; None leaves as it is."""
+
+    rtsp: bool | None = None
+    mjpeg: bool | None = None
+
+
+@dataclass(frozen=True)
 class Restart:
     """Reboot the camera."""
 
 
 Motor = GotoPlace | LookAt | MoveBy | ScanFor
-Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Options | Restart
+Command = (
+    Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Options | Broadcast | Restart
+)
 
 
 def read(key: str, value: Any) -> Command:
@@ -264,6 +272,8 @@ READERS: dict[str, Callable[[Any], Command]] = {
     "AddTarget": lambda value: Targets("add", _markers(value)),
     "RemoveTarget": lambda value: Targets("remove", _markers(value)),
     "SetRoutine": _routine,
+    "RTSP": lambda value: Broadcast(rtsp=_flag(value)),
+    "MJPEG": lambda value: Broadcast(mjpeg=_flag(value)),
     "Mirror": lambda value: Options(SetPicture(mirror=_flag(value))),
     "Flip": lambda value: Options(SetPicture(flip=_flag(value))),
     "VideoMode": _mode,

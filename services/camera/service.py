@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from services import topics
-from services.bus import Message
+from services.bus import LOST_TOPIC, Message
 from services.camera import answers as life
 from services.camera import orders
+from services.camera.alarm.listener import HEARD, Heard
+from services.camera.alarm.motion import MotionWatch
 from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
 from services.camera.chores import WITHOUT_CAMERA, Chores
@@ -30,6 +32,8 @@ from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
 from services.camera.scan.sightings import Eye
 from services.camera.settings import Config
+from services.camera.video.channel import ASKED, Channel
+from services.camera.video.feed import Feed
 from services.errors import BadMessage
 from services.payloads import Order, OrderState, PositionSet
 
@@ -40,7 +44,14 @@ FRESH_S = 2.0  # a reading as old as this still tells where a camera at rest loo
 class CameraService:
     """A Service (`runner.py`). `analyst` makes the one that looks at frames, a new one for each scan."""
 
-    def __init__(self, config: Config, sender: Sender, analyst: Callable[[], Analyst], eye: Eye) -> None:
+    def __init__(
+        self,
+        config: Config,
+        sender: Sender,
+        analyst: Callable[[], Analyst],
+        eye: Eye,
+        channel: Channel | None = None,
+    ) -> None:
         self.config = config
         self.subscribes = tuple(
             topic.filter_for(cam=config.name)
@@ -52,6 +63,7 @@ class CameraService:
                 topics.HOMEASSISTANT_STATUS,
             )
         )
+        self.subscribes += (LOST_TOPIC,)
         self.due: float | None = 0.0
         self.counters: dict[str, int] = {"requests": 0, "failed_requests": 0, "frames": 0}
         self._out: list[Message] = []
@@ -67,15 +79,24 @@ class CameraService:
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
         self.scanner = Scanner(config, self.skill, eye, analyst, self.bulletin, self.places)
-        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin)
+        self.bulletin.video = channel
+        self.feed = Feed(config, self.health, channel, publish)
+        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed)
+        self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=config.alarm)
         self._polling = False
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
         """Takes a reply, an analysed frame, or an order."""
         if message.topic == REPLY and isinstance(message.value, Reply):
             self._reply(message.value, now)
+        elif message.topic == HEARD and isinstance(message.value, Heard):
+            self.motion.take(message.value)
         elif message.topic == ANALYSED and isinstance(message.value, Analysed):
             self.scanner.take(message.value)
+        elif message.topic == LOST_TOPIC:  # nobody could end a motion any more
+            self.motors.give_up("the connection to the broker was lost", now)
+        elif message.topic == ASKED:
+            self.stage.begin(self.feed.shown(), now, _nobody)
         else:
             try:
                 read = topics.read(message, now)
@@ -102,16 +123,28 @@ class CameraService:
         """Wakes the plans, and publishes what has changed."""
         if not self._polling:
             self._polling = True
-            self.stage.begin(self._poll(now), now, _nobody)
+            for plan in (self._poll(now), self.feed.run(now), self.feed.every_so_often(now)):
+                self.stage.begin(plan, now, _nobody)
         self.stage.tick(now)
         self.motors.tick(now)
         self.health.moving = self.motors.busy
         self.counters["frames"] = self.scanner.frames
         self.scanner.tick(now)
+        self._watch_motion(now)
         self.bulletin.tick(now, self.counters)
         self.discovery.tick(self.bulletin.identity, self.places.named)
         self.due = min(time for time in (self.bulletin.due, self.stage.due) if time is not None)
         return self._flush()
+
+    def _watch_motion(self, now: float) -> None:
+        turning = self.motors.busy or self.bulletin.turning
+        motion = self.motion.tick(now, turning=turning, online=self.health.online)
+        if motion is not None:
+            self.bulletin.say(topics.CAMERA_MOTION, motion)
+
+    def _begin(self, plan: Plan[None], now: float) -> None:
+        """A plan whose end nobody waits for."""
+        self.stage.begin(plan, now, _nobody)
 
     def close(self) -> None:
         """Ends the processes of a scan that is under way."""
@@ -138,6 +171,7 @@ class CameraService:
     def _take_picture(self, picture: Picture) -> None:
         """The motors follow the picture: when its options changed, which way they turn is to be seen anew."""
         old, self.scanner.picture = self.scanner.picture, picture
+        self.feed.turned(picture)
         if (picture.flip, picture.mirror) != (old.flip, old.mirror):
             self.skill.forget_senses(flip=picture.flip, mirror=picture.mirror)
 
@@ -160,7 +194,7 @@ class CameraService:
     def _read(self, read: topics.Read, now: float) -> None:
         payload = read.payload
         if read.topic is topics.CAMERA_SNAPSHOT_GET:
-            self.stage.begin(self.chores.snapshot(), now, _nobody)
+            self.stage.begin(self.feed.published(), now, _nobody)
         elif read.topic in (topics.HOMEASSISTANT_ENTITY, topics.HOMEASSISTANT_STATUS):
             self.discovery.hear(read)
         elif isinstance(payload, PositionSet):
@@ -210,6 +244,8 @@ class CameraService:
             self._goal(command)
         elif isinstance(command, orders.RemovePlace):
             self.places.get(command.place)
+        elif isinstance(command, orders.Broadcast):
+            self.feed.check(command)
         elif isinstance(command, ScanFor):
             self.scanner.check(command)
 

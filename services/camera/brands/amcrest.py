@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import httpx
 
 from services.camera.address import Address
-from services.camera.brands.dahua import picture, ptz, replies, system
+from services.camera.alarm.listener import Ear
+from services.camera.brands.dahua import errands, events, picture, ptz, replies, streams, system
 from services.camera.requests import (
     Away,
     Camera,
     ClearPreset,
     Direction,
+    Errand,
+    Event,
+    FindStream,
     GetPicture,
     GotoPreset,
     Identify,
@@ -26,9 +32,12 @@ from services.camera.requests import (
     Status,
     Stop,
 )
-from services.camera.web.connection import COMMAND, SNAPSHOT, connection, fetch
+from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch
 from services.camera.web.digest import Login
+from services.camera.web.endless import Endless
 from services.camera.web.gate import Gate
+
+BEATS = 3.25  # so many heartbeats of silence are the end: three were missed, and one may be late
 
 
 class Amcrest:
@@ -42,6 +51,7 @@ class Amcrest:
         *,
         urgent: bool = False,
     ) -> None:
+        self.address = address
         self.login = Login(address.user, address.password, gate or Gate(), urgent=urgent)
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
@@ -70,16 +80,20 @@ class Amcrest:
                 return self._picture()
             case SetPicture():
                 return self._set_picture(request)
+            case FindStream(source):
+                return streams.address(self.address, source)
             case Identify():
                 return self._identify()
             case Reboot():
                 return self._command(system.magic("reboot"))
+            case Errand():
+                return self._talk(errands.dialogue(request))
 
     def _get(self, target: str, timeout: httpx.Timeout = COMMAND) -> httpx.Response:
         return replies.check(fetch(self.http, target, timeout))
 
-    def _command(self, target: str) -> object:
-        body = self._get(target).text
+    def _command(self, target: str, timeout: httpx.Timeout = COMMAND) -> object:
+        body = self._get(target, timeout).text
         if not replies.is_ok(body):
             raise Refused(f"expected OK from the camera, got {' '.join(body.split())[:80]!r}")
         return None
@@ -96,7 +110,7 @@ class Amcrest:
         directions = [known] if known is not None and not request.every else list(Direction)
         for direction in directions:
             try:
-                self._command(ptz.stop(direction, channel))
+                self._command(ptz.stop(direction, channel), STOP)
             except Refused as error:  # firmware that refuses to stop what does not run
                 refused.append(error)
         if len(refused) == len(directions):
@@ -145,10 +159,51 @@ class Amcrest:
             self._command(picture.set_mode(request.mode))
         return self._picture()
 
+    def _talk(self, dialogue: errands.Dialogue) -> object:
+        try:
+            target = next(dialogue)
+            while True:
+                try:
+                    body = self._get(target).text
+                except Refused as error:
+                    target = dialogue.throw(error)
+                else:
+                    target = dialogue.send(body)
+        except StopIteration as stop:
+            return stop.value
+
     def _identify(self) -> Identity:
         model = replies.read_table(self._get(system.magic("getDeviceType")).text).get("type", "")
         serial = replies.read_table(self._get(system.magic("getSerialNo")).text).get("sn", "")
         return Identity(model, serial, system.read_version(self._get(system.magic("getSoftwareVersion")).text))
+
+
+class AmcrestEar:
+    """An Ear (`alarm/listener.py`) over the event stream; three heartbeats missed are the end."""
+
+    def __init__(self, address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> None:
+        self._endless = Endless(address, gate, BEATS * heartbeat_s)
+        self._target = events.attach(codes, heartbeat_s)
+
+    def listen(self) -> Iterator[list[Event]]:
+        """See `Ear`."""
+        with self._endless.open(self._target) as (response, pieces):
+            if response.is_closed:
+                replies.check(response)
+                raise Away("the camera gave a short answer instead of its events")
+            parser = events.Parser(events.boundary(response.headers.get("content-type", "")))
+            yield []
+            for piece in pieces:
+                yield parser.feed(piece)
+
+    def close(self) -> None:
+        """See `Ear`."""
+        self._endless.close()
+
+
+def ear(address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> Ear:
+    """The camera's own alarms; it gives a sign of life every `heartbeat_s`."""
+    return AmcrestEar(address, gate, codes, heartbeat_s)
 
 
 def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:

@@ -155,6 +155,9 @@ class Login(httpx.Auth):
                 self.gate.pause(ODD_S)
             old = self.challenge.count > 0
             with self.gate.login(urgent=self.urgent) as login:
+                if old and login.doubted:
+                    self.challenge = None
+                    continue
                 self._sign(request, self.challenge)
                 outcome = self._read((yield request))
                 if outcome == "passed":
