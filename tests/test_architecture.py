@@ -89,6 +89,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.bridge.images",
         "services.simulators.camera.",
     ),
+    "gi": ("services.simulators.camera.rtsp.",),
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),

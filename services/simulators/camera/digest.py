@@ -46,6 +46,7 @@ class Door:
 
     def __init__(self, realm: str, user: str, password: str, profile: Profile, rng: Random) -> None:
         self.realm, self.user, self.profile = realm, user, profile
+        self.account = (user, password)  # GStreamer's own check wants it in the clear
         self._ha1 = hashed(f"{user}:{realm}:{password}")
         self._basic = base64.b64encode(f"{user}:{password}".encode())
         self._rng = rng
@@ -63,6 +64,17 @@ class Door:
         if header.lower().startswith("basic "):
             return self._basic_verdict(header, now)
         return self._digest_verdict(method, target, fields(header), now)
+
+    def judge_viewer(self, method: str, header: str | None, now: float) -> bool:
+        """Counts and locks out over RTSP too, where the response has no qop. Says nothing of the nonce."""
+        if now < self.locked_until:
+            return self._refused("locked").passed
+        if header is None:
+            return True  # a challenge follows
+        said = fields(header)
+        asked = hashed(f"{method}:{said.get('uri', '')}")
+        right = said.get("response") == hashed(f"{self._ha1}:{said.get('nonce', '')}:{asked}")
+        return (right and said.get("username") == self.user) or self._wrong(now).passed
 
     def forget(self) -> None:
         """Drops every nonce (a reboot)."""

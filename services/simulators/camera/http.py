@@ -34,6 +34,9 @@ class Faults:
 
     left: int = 0
     how: str = "close"  # or 401, 500, text
+    silent_events: bool = False  # event streams stay open and say nothing, not even that they live
+    frozen_stream: bool = False  # video connections stay open without a new picture
+    corrupt_jpeg: bool = False
 
     def next(self) -> str | None:
         """How this request is to fail."""
@@ -65,6 +68,7 @@ class CameraServer(Port):
         self.device, self.door, self.pictures, self.clock = device, door, pictures, clock
         self.latency_s, self.spread_s = device.profile.latency_s, device.profile.latency_spread_s
         self.snapshot_s = device.profile.snapshot_s
+        self.cuts: list[Callable[[], None]] = []  # how the connections of other ports are cut
         self.closing, self.faults, self.log = Event(), Faults(), deque[dict[str, Any]](maxlen=LOG_LENGTH)
         self.running = Event()  # cleared while frozen
         self.running.set()
@@ -81,6 +85,21 @@ class CameraServer(Port):
         """The door's verdict, one request at a time."""
         with self._lock:
             return self.door.judge(method, target, header, self.clock())
+
+    def judge_viewer(self, method: str, header: str | None) -> bool:
+        """The same for RTSP, where the challenge is another's."""
+        with self._lock:
+            return self.door.judge_viewer(method, header, self.clock())
+
+    @property
+    def is_off(self) -> bool:
+        """Whether nobody is answered: it restarts, or is switched off."""
+        return self.device.booting(self.clock()) or self.closing.is_set()
+
+    @property
+    def shows_pictures(self) -> bool:
+        """Whether new pictures go out."""
+        return self.running.is_set() and not self.faults.frozen_stream and not self.is_off
 
     def enter(self, connection: socket.socket) -> None:
         """A connection was opened."""
@@ -99,6 +118,12 @@ class CameraServer(Port):
                 with suppress(OSError):
                     connection.shutdown(socket.SHUT_RDWR)
         self.device.events.wake_all()
+        self.cut_streams()
+
+    def cut_streams(self) -> None:
+        """Ends the RTSP connections."""
+        for cut in self.cuts:
+            cut()
 
     def switch_off(self) -> None:
         """Ends every wait and connection, so that `server_close` finds no thread left."""
@@ -131,7 +156,7 @@ class Connection(BaseHTTPRequestHandler):
 
     def handle(self) -> None:
         """One request, unless the camera is off."""
-        if self.server.device.booting(self.server.clock()) or self.server.closing.is_set():
+        if self.server.is_off:
             self._reset()
         else:
             self.handle_one_request()
@@ -163,13 +188,15 @@ class Connection(BaseHTTPRequestHandler):
     def _control(self, request: Request, entry: dict[str, Any]) -> None:
         """One at a time. A command acts when it has been processed; a status tells how it was when asked."""
         with self.server.control:
-            reads = request.action.startswith("get")
+            reads, encoders = request.action.startswith("get"), self.server.device.tables.encoders
             answer = self.server.device.answer(request, self.server.clock()) if reads else None
             self.server.delay(self.server.latency_s, self.server.spread_s if self.server.latency_s else 0.0)
             answer = answer or self.server.device.answer(request, self.server.clock())
         self._send(answer, entry)
         if self.server.device.booting(self.server.clock()):
             self.server.drop()
+        elif self.server.device.tables.encoders != encoders:
+            self.server.cut_streams()
 
     def _snapshot(self, request: Request, entry: dict[str, Any]) -> None:
         """Overlapping snapshots fail."""
@@ -187,12 +214,17 @@ class Connection(BaseHTTPRequestHandler):
         kind = f"multipart/x-mixed-replace; boundary={events.BOUNDARY}"
         entry["status"] = 200
         self._write(f"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Type: {kind}\r\n\r\n".encode())
-        while not self.server.closing.is_set():
-            self.server.running.wait()
-            data = self.server.pictures.jpeg(stream, self.server.clock())
-            head = f"--{events.BOUNDARY}\r\nContent-Type: {IMAGE}\r\nContent-Length: {len(data)}\r\n\r\n"
-            self._write(head.encode() + data + b"\r\n")
-            self.server.closing.wait(1 / self.server.pictures.fps(stream))
+        encoders = self.server.device.tables.encoders
+        while not self.server.closing.wait(1 / self.server.pictures.fps(stream)):
+            if self.server.device.tables.encoders != encoders:
+                return
+            if self.server.shows_pictures:
+                self._write(self._part(stream))
+
+    def _part(self, stream: Stream) -> bytes:
+        data = self.server.pictures.jpeg(stream, self.server.clock())
+        head = f"--{events.BOUNDARY}\r\nContent-Type: {IMAGE}\r\nContent-Length: {len(data)}\r\n\r\n"
+        return head.encode() + data + b"\r\n"
 
     def _events(self, request: Request, entry: dict[str, Any]) -> None:
         least, most = HEARTBEATS_S

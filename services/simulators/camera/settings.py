@@ -19,6 +19,7 @@ class Config(Section):
     host: str = "127.0.0.1"
     port: int = Field(default=0, ge=0, le=65535)
     side_door_port: int = Field(default=0, ge=0, le=65535)
+    rtsp_port: int | None = Field(default=0, ge=0, le=65535)  # None: no RTSP
     user: str = "ros"
     password: SecretStr = SecretStr("")
     profile: str = "ip3m-941w-2019"

@@ -1,6 +1,6 @@
 """The tests' way in, on a port of its own: JSON to see and to change what no real camera would tell.
 
-GET  /state                              true pose, reading, motion, counters of the door
+GET  /state                              true pose, reading, motion, the door's counters, frames rendered and their rate
 GET  /log                                requests: time, method, target, status, authorized
 POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand there at once
 POST /event    {"code", "action", "index"}
@@ -17,7 +17,7 @@ from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler
 from typing import Any
 
-from services.simulators.camera.http import CameraServer, Faults, Port
+from services.simulators.camera.http import CameraServer, Port
 from services.simulators.camera.motors import reading
 
 Order = Callable[[CameraServer, dict[str, Any]], object]
@@ -34,6 +34,7 @@ def state(camera: CameraServer) -> dict[str, Any]:
         "booting": camera.device.booting(now),
         "presets": {number: name for number, (name, _) in camera.device.ptz.presets.items()},
         "door": camera.door.counters,
+        **camera.pictures.rates(),
     }
 
 
@@ -48,7 +49,7 @@ def _event(camera: CameraServer, order: dict[str, Any]) -> None:
 
 
 def _fail(camera: CameraServer, order: dict[str, Any]) -> None:
-    camera.faults = Faults(int(order["n"]), str(order.get("how", "close")))
+    camera.faults.left, camera.faults.how = int(order["n"]), str(order.get("how", "close"))
 
 
 def _freeze(camera: CameraServer, order: dict[str, Any]) -> None:
