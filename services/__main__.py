@@ -56,7 +56,9 @@ def serve(services: list[str], config: Config = CONFIG) -> None:
 
 
 @app.command(epilog="Example: apartment simulate camera --config config/simulated.yaml")
-def simulate(what: Annotated[str, typer.Argument(help="camera or home")], config: Config = CONFIG) -> None:
+def simulate(
+    what: Annotated[str, typer.Argument(help="camera, camera-NAME of several, or home")], config: Config = CONFIG
+) -> None:
     """Run one simulator alone."""
     serve([f"simulated-{what}"], config)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import os
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,7 @@ from services.errors import ConfigError
 from services.home import Home
 from services.registry import REGISTRY, Row
 from services.section import Section
+from services.topic import LEVELS
 
 M = TypeVar("M", bound=BaseModel)
 TOP = ("bus", "state", "home", "default_camera", "grouped")
@@ -112,6 +114,7 @@ def load(
     cameras = _cameras(raw, source)
     given = {"home": home, "cameras": cameras, "folder": file.parent}
     _unknown_sections(raw, source)
+    _misnamed_cameras(raw, source)
     instances = {one.name: one for one in _instances(raw, source, cameras, given)}
     faults = [*_wanted(source.faults, only), *home_faults, *(check_files(instances) if deep else [])]
     if faults or top is None or home is None:
@@ -129,12 +132,7 @@ def _wanted(faults: list[str], only: tuple[str, ...] | None) -> list[str]:
     if only is None:
         return faults
     mine = ("bus.accounts.", *(f"{row.section[0]}." for row in REGISTRY))
-    cams = [name.removeprefix("camera-") for name in only]
-    kept = [
-        *(f"bus.accounts.{name}" for name in only),
-        *(f"cameras.{cam}." for cam in cams),
-        *(f"{name}." for name in only),
-    ]
+    kept = [*(f"bus.accounts.{name}" for name in only), *(f"{section}." for name in only for section in _section(name))]
 
     def matters(fault: str) -> bool:
         where = fault.split(": ", 2)[1]
@@ -142,6 +140,13 @@ def _wanted(faults: list[str], only: tuple[str, ...] | None) -> list[str]:
         return not ("expected ${" in fault and foreign)
 
     return [fault for fault in faults if matters(fault)]
+
+
+def _section(name: str) -> Iterator[str]:
+    """Where the settings of a service of that name stand."""
+    for row in REGISTRY:
+        if match := re.fullmatch(row.name.replace("<cam>", "(.+)"), name):
+            yield ".".join(row.section).replace("<cam>", match[match.lastindex or 0])
 
 
 def _state_folder(top: Top, file: Path, environment: Mapping[str, str]) -> Path:
@@ -184,11 +189,20 @@ def _unknown_sections(raw: dict[str, Any], source: Document) -> None:
             source.fault(("simulators", key), _unknown(key, inner))
 
 
+def _misnamed_cameras(raw: dict[str, Any], source: Document) -> None:
+    """A camera's name becomes a level of topics and a ROS name."""
+    for place in (("cameras",), ("simulators", "cameras")):
+        named = _at(raw, place)
+        for name in named if isinstance(named, dict) else ():
+            if not re.fullmatch(LEVELS["cam"], str(name)):
+                source.fault((*place, name), f"expected a name of a-z, 0-9 and _ beginning with a letter, got {name!r}")
+
+
 def _instances(
     raw: dict[str, Any], source: Document, cameras: tuple[str, ...], given: dict[str, Any]
 ) -> Iterator[Instance]:
     for row in REGISTRY:
-        for camera in cameras if "<cam>" in row.name else ("",):
+        for camera in _names_in(row, raw, cameras):
             section = tuple(part.replace("<cam>", camera) for part in row.section)
             settings = _at(raw, section)
             if settings is None and not _at(raw, section[:-1], section[-1]):
@@ -197,6 +211,14 @@ def _instances(
             config = _config(row, settings or {}, source, section, {**given, "name": camera or name})
             if config is not None:
                 yield Instance(name, row, config)
+
+
+def _names_in(row: Row, raw: dict[str, Any], cameras: tuple[str, ...]) -> tuple[str, ...]:
+    """What `<cam>` stands for in a row, one service each; for a row without it one nameless service."""
+    if "<cam>" not in row.name:
+        return ("",)
+    named = _at(raw, row.section[:-1])
+    return cameras if row.section[0] == "cameras" else tuple(map(str, named if isinstance(named, dict) else ()))
 
 
 def _at(raw: Any, section: tuple[str, ...], key: str | None = None) -> Any:

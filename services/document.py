@@ -32,6 +32,13 @@ _Loader.yaml_implicit_resolvers = {
 _Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"true|false|True|False"), list("tfTF"))
 
 
+class _Dumper(yaml.SafeDumper):
+    """A key on each line, a list in one."""
+
+
+_Dumper.add_representer(list, lambda dumper, value: dumper.represent_sequence("tag:yaml.org,2002:seq", value, True))
+
+
 @dataclass
 class Document:
     """`value` as plain Python values; `lines` maps a path of keys to its line; `faults` found while reading."""
@@ -60,9 +67,10 @@ def dotted(path: Path_) -> str:
     return text
 
 
-def read(file: Path, secret: Callable[[str], str | None] | None = None) -> Document:
+def read(file: Path, secret: Callable[[str], str | None] | None = None, *, names: bool = False) -> Document:
     """Reads a file; `${NAME}` and `${NAME:-default}` in texts are replaced by what `secret` knows.
 
+    `names`: keys are people's words and stay as they are written, also `007` and `~`.
     What is wrong with the YAML, a key that stands twice and a name that nobody knows are in `faults`.
     """
     document = Document(file)
@@ -76,14 +84,14 @@ def read(file: Path, secret: Callable[[str], str | None] | None = None) -> Docum
         document.fault((), f"expected YAML, got {error.problem}")
         return document
     if root is not None:
-        document.value = _Reader(document, secret).value(root, ())
+        document.value = _Reader(document, secret, names=names).value(root, ())
     return document
 
 
 def write(file: Path, value: Any) -> None:
     """Writes plain values as YAML; whoever reads meanwhile sees the old file or the new one, never a part."""
     beside = file.with_name(f".{file.name}.{os.getpid()}")
-    text: str = yaml.safe_dump(value, allow_unicode=True, sort_keys=False, default_flow_style=None)
+    text: str = yaml.dump(value, Dumper=_Dumper, allow_unicode=True, sort_keys=False, default_flow_style=False)
     with beside.open("w", encoding="utf-8") as output:
         output.write(text)
         output.flush()
@@ -101,9 +109,10 @@ def must(document: Document) -> Any:
 class _Reader:
     """From YAML's nodes to values."""
 
-    def __init__(self, document: Document, secret: Callable[[str], str | None] | None) -> None:
+    def __init__(self, document: Document, secret: Callable[[str], str | None] | None, *, names: bool) -> None:
         self.document = document
         self.secret = secret
+        self.names = names
         self.scalars = _Loader("")
 
     def value(self, node: yaml.Node, path: Path_) -> Any:
@@ -117,7 +126,11 @@ class _Reader:
     def mapping(self, node: yaml.MappingNode, path: Path_) -> dict[Any, Any]:
         values: dict[Any, Any] = {}
         for key_node, child in node.value:
-            key = self.scalar(key_node, path)
+            if not isinstance(key_node, yaml.ScalarNode):
+                self.document.lines[(*path, "?")] = key_node.start_mark.line + 1
+                self.document.fault((*path, "?"), "expected a plain key, got a list or a mapping")
+                continue
+            key = str(key_node.value) if self.names else self.scalar(key_node, path)
             here = (*path, key)
             if key in values:
                 self.document.fault(

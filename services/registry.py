@@ -1,7 +1,7 @@
 """The table of services: what can run, where its code and its configuration are, and how it meets the bus.
 
 Modules are named as texts, so that no service loads another's libraries. A name with `<cam>` stands for one
-service per camera of the configuration.
+service per key at that place of its section: per camera of the configuration, per simulated camera.
 """
 
 from __future__ import annotations
@@ -37,6 +37,13 @@ REGISTRY: tuple[Row, ...] = (
         "services.simulators.camera",
         ("simulators", "camera"),
         "a camera on the network that is not there",
+        on_bus=False,
+    ),
+    Row(
+        "simulated-camera-<cam>",
+        "services.simulators.camera",
+        ("simulators", "cameras", "<cam>"),
+        "one of several of them",
         on_bus=False,
     ),
     Row(

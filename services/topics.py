@@ -68,12 +68,7 @@ HOME_SET = Topic(
     "home/<item>/set", Kind.COMMAND, str, (*STEERS, "camera-<cam>"), ("openhab", "dashboard", "operator"), "postUpdate"
 )
 SERVICE_STATUS = Topic(
-    "service/<service>/status",
-    Kind.STATE,
-    str,
-    ("<service>",),
-    ALL,
-    "`online` or `offline`, the latter as last will",
+    "service/<service>/status", Kind.STATE, str, ("<service>",), ALL, "`online` or `offline`, the latter as last will"
 )
 SERVICE_INFO = Topic(
     "service/<service>/info", Kind.STATE, p.ServiceInfo, ("<service>",), SHOWN, "version, start and counters"
@@ -83,7 +78,7 @@ CAMERA_STATUS = Topic(
     Kind.STATE,
     p.CameraStatus,
     ("camera-<cam>",),
-    SHOWN,
+    (*SHOWN, "openhab"),
     "whether the camera can be used, and why not",
 )
 CAMERA_ORDER = Topic(
@@ -165,20 +160,15 @@ CAMERA_SCAN_IMAGE = Topic(
     "an analysed frame as JPEG with the markers drawn, while ScanImgPub is on",
 )
 CAMERA_SNAPSHOT_GET = Topic(
-    "camera/<cam>/snapshot/get",
-    Kind.COMMAND,
-    str,
-    (*STEERS, "openhab"),
-    ("camera-<cam>",),
-    "asks for a snapshot",
+    "camera/<cam>/snapshot/get", Kind.COMMAND, str, (*STEERS, "openhab"), ("camera-<cam>",), "asks for a snapshot"
 )
-CAMERA_SNAPSHOT = Topic("camera/<cam>/snapshot", Kind.BLOB, bytes, ("camera-<cam>",), SHOWN, "a JPEG")
+CAMERA_SNAPSHOT = Topic("camera/<cam>/snapshot", Kind.BLOB, bytes, ("camera-<cam>",), (*SHOWN, "openhab"), "a JPEG")
 CAMERA_STREAM = Topic(
     "camera/<cam>/stream",
     Kind.STATE,
     p.Stream,
     ("camera-<cam>",),
-    SHOWN,
+    (*SHOWN, "openhab"),
     "which streams are on, and the address of ours",
 )
 DIAGNOSTICS = Topic(
@@ -186,9 +176,25 @@ DIAGNOSTICS = Topic(
     Kind.STATE,
     p.Diagnostic,
     ALL,
-    SHOWN,
+    (*SHOWN, "openhab"),
     "health of a component, about once a second",
     stored=True,
+)
+HOMEASSISTANT_ENTITY = Topic(
+    "homeassistant/<platform>/<cam>/<entity>/config",
+    Kind.STATE,
+    str,
+    ("camera-<cam>",),
+    ("openhab", "operator", "camera-<cam>"),
+    "Home Assistant's discovery, for openHAB too: JSON of one entity, empty when there is none (any more)",
+)
+HOMEASSISTANT_STATUS = Topic(
+    "homeassistant/status",
+    Kind.STATE,
+    str,
+    ("openhab",),
+    ("camera-<cam>", "operator"),
+    "`online` when Home Assistant (with the account of openHAB) has started and wants to hear its entities again",
 )
 
 TABLE: tuple[Topic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Topic))

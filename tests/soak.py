@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -21,6 +22,8 @@ from rich.table import Table
 from services.simulated import Simulated, parts_of, services_of
 from services.virtual import VirtualApartment
 from tests import trials
+from tests.camera import trials as camera_trials
+from tests.small_flat import SmallFlat, small_flat
 
 LONGEST_S = 600.0
 Turn = Callable[[random.Random], float]
@@ -34,6 +37,15 @@ def real(trial: Callable[[Simulated, random.Random], float]) -> Iterator[Turn]:
         parts_of(Path(name) / "parts", real=True) as parts,
         services_of(Path(name) / "services", parts) as flat,
     ):
+        yield lambda rng: trial(flat, rng)
+
+
+@contextmanager
+def cameras(
+    trial: Callable[[SmallFlat, random.Random], float], names: tuple[str, ...] = ("ip1",), **simulator: Any
+) -> Iterator[Turn]:
+    """Turns with simulated cameras and a broker alone, one apartment for all."""
+    with tempfile.TemporaryDirectory() as name, small_flat(Path(name), names, simulator=simulator) as flat:
         yield lambda rng: trial(flat, rng)
 
 
@@ -77,6 +89,11 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
         lambda: real(lambda flat, rng: sum(trials.rubbish(flat, 10_000, rng.randrange(10**6)).values())),
         5,
         "bad messages counted",
+    ),
+    "camera-hangs": (
+        lambda: cameras(lambda flat, rng: camera_trials.hang(flat, "d"), ("a", "b", "c", "d"), latency_s=0.1),
+        10,
+        "x the time of an order",
     ),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),

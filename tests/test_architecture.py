@@ -107,7 +107,7 @@ DOORS: dict[str, tuple[str, ...]] = {
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
     "services.bus", "services.vision.", "services.camera.ptz.move", "services.camera.scan.search",
-    "services.camera.brands.dahua.", "services.bridge.rules",
+    "services.camera.brands.dahua.", "services.camera.discovery", "services.bridge.rules",
     "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
     "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",
     "services.simulators.devices", "services.simulators.life",

@@ -76,6 +76,29 @@ def test_six_faults_of_six_kinds_are_all_told_with_file_and_line(folder: Path) -
     assert "items.Kitchen-Light: expected a name of letters, digits and _" in by_place[places[5]]
 
 
+def test_several_cameras_are_simulated_from_one_file_each_in_a_service_of_its_own(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    spoil(file, "simulators:\n", "simulators:\n  cameras:\n    hall: {port: 8942}\n    attic: {profile: 2020s-dahua}\n")
+    instances = load(file, deep=True).instances
+    assert {"simulated-camera", "simulated-camera-hall", "simulated-camera-attic"} <= set(instances)
+    assert instances["simulated-camera-hall"].config.model_dump()["port"] == 8942
+    assert instances["simulated-camera-attic"].config.model_dump()["profile"] == "2020s-dahua"
+
+
+def test_a_camera_whose_name_cannot_be_a_topic_is_a_fault(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, "simulators:\n", "simulators:\n  cameras:\n    Hall-1: {}\n") + 2
+    assert f"{file}:{line}: simulators.cameras.Hall-1: expected a name of a-z" in faults(file)[0]
+
+
+def test_a_machine_that_runs_one_service_needs_that_services_secrets_only(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    spoil(file, "simulators:\n", "simulators:\n  cameras:\n    hall: {password: '${NOT_HERE}'}\n")
+    load(file, ("simulated-camera",))
+    with pytest.raises(ConfigError, match="NOT_HERE"):
+        load(file, ("simulated-camera-hall",))
+
+
 def test_the_files_that_services_name_are_checked_too(folder: Path) -> None:
     file = folder / "simulated.yaml"
     files = [folder / name for name in ("bridge.yaml", "ip1/ost.yaml", "ip1/preset_position.yaml", "world.yaml")]

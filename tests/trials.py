@@ -146,7 +146,8 @@ def rubbish_topic(rng: random.Random) -> str:
     row = rng.choice([row for row in topics.TABLE if row.payload is not bytes])
     levels = {"cam": rng.choice(["ip1", "ip2", "x" * 50]), "service": rng.choice(["nobody", "a-b"]), "component": "x/y",
               "item": rng.choice(["Kitchen_Light", "Hall_Dimmer", "No_Such_Item", "Lamp_Color"]),
-              "key": rng.choice(["Goto", "Scan", "Nonsense"]), "marker": str(rng.randrange(2000))}  # fmt: skip
+              "key": rng.choice(["Goto", "Scan", "Nonsense"]), "marker": str(rng.randrange(2000)),
+              "platform": "sensor", "entity": "x"}  # fmt: skip
     return re.sub(r"<(\w+)>", lambda m: levels[m[1]], row.pattern) + rng.choice(["", "", "", "/more", "é"])
 
 

@@ -1,4 +1,4 @@
-"""Where a camera is and how to log in there: what every brand's `connect` is given."""
+"""Where a camera is, how to log in there and how far it turns: what every brand's `connect` is given."""
 
 from __future__ import annotations
 
@@ -16,3 +16,6 @@ class Address:
     password: SecretStr
     rtsp_port: int = 554
     channel: int | None = None
+    pan_dead_arc: tuple[float, float] = (179.0, 186.0)  # degrees; for brands that tell shares of the travel
+    tilt_range: tuple[float, float] = (-10.0, 108.0)
+    zoom_range: tuple[float, float] = (0.0, 8.0)

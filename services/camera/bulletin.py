@@ -31,6 +31,7 @@ class Bulletin:
         self.health = health
         self.places = places
         self.publish = publish
+        self.diagnostics = True  # whether the health is said
         self.due = 0.0
         self.reading: Reading | None = None
         self.turning = False
@@ -78,8 +79,9 @@ class Bulletin:
             self._reload()
             self.say(topics.CAMERA_PLACES, self.places.payload)
             self.say(topics.CAMERA_STREAM, Stream(rtsp=False, mjpeg=False, url=""))
-            component = f"camera/{self.camera}"
-            self.publish(topics.DIAGNOSTICS.message(self._diagnostic(counters), component=component))
+            if self.diagnostics:
+                component = f"camera/{self.camera}"
+                self.publish(topics.DIAGNOSTICS.message(self._diagnostic(counters), component=component))
 
     def _reload(self) -> None:
         """Somebody may have edited the files; a fault is told once, and the old places stay."""

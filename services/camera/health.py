@@ -13,7 +13,7 @@ from services.camera.requests import Away, BadLogin, Locked, Reply
 from services.payloads import CameraStatus
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0  # between attempts to reach a camera that is away
-LOGIN_PAUSE_S, LONGEST_LOGIN_S = 120.0, 1800.0  # after a wrong password: each attempt may lock the account
+MARGIN_S = 0.1  # so that the gate (`web/gate.py`) is open when it is asked again
 IDLE_S = 1.0  # between two readings of a camera at rest
 
 State = Literal["online", "offline", "bad_login", "locked", "rebooting", "degraded"]
@@ -46,9 +46,9 @@ class Health:
     def take(self, reply: Reply) -> None:
         """Judges one reply. A refusal is an answer too: the camera is there."""
         error = reply.error
-        if isinstance(error, BadLogin | Locked):
-            self._away(reply, "bad_login" if isinstance(error, BadLogin) else "locked", str(error))
-            self.next_poll = reply.received + min(LONGEST_LOGIN_S, LOGIN_PAUSE_S * 2 ** (self.failures - 1))
+        if isinstance(error, BadLogin):
+            self._away(reply, "locked" if isinstance(error, Locked) else "bad_login", str(error))
+            self.next_poll = reply.received + error.again_s + MARGIN_S
         elif isinstance(error, Away):
             state: State = "rebooting" if self.rebooting else "degraded" if self.moving else "offline"
             self._away(reply, state, str(error))

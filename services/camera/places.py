@@ -5,7 +5,12 @@ Written so that a reader sees the old file or the new one; read again when someb
 
 from __future__ import annotations
 
+import fcntl
 import math
+import os
+import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +23,7 @@ from services.payloads import Places as PlacesPayload
 POSITIONS = "preset_position.yaml"
 PRESETS = "preset_coords.yaml"
 LONGEST_NAME = 80
+CONTROL = ("Cc", "Cs", "Zl", "Zp")  # control characters, halves of characters, and what breaks a line
 NEAR_DEG = 0.6  # a reading that near to a place is at that place
 NEAR_ZOOM = 0.5
 
@@ -25,8 +31,8 @@ NEAR_ZOOM = 0.5
 def name_of(text: str) -> str:
     """A name that may stand for a place; ValueError says what is wrong with it."""
     name = text.strip()
-    if not name or len(name) > LONGEST_NAME or not name.isprintable():
-        raise ValueError(f"expected a name of 1 to {LONGEST_NAME} printable characters, got {text[:90]!r}")
+    if not name or len(name) > LONGEST_NAME or any(unicodedata.category(one) in CONTROL for one in name):
+        raise ValueError(f"expected a name of 1 to {LONGEST_NAME} characters, no control characters, got {text[:90]!r}")
     return name
 
 
@@ -36,7 +42,9 @@ class Places:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.named: dict[str, Place] = {}
-        self._read_at: tuple[int, ...] = ()
+        self._only_presets: dict[str, int] = {}  # of names that have no position: somebody else's, kept as they are
+        self._read_at: tuple[object, ...] = ()
+        self._fault: ConfigError | None = None
         self.reload()
 
     def reload(self) -> bool:
@@ -45,17 +53,26 @@ class Places:
         if state == self._read_at:
             return False
         self._read_at = state
-        self.named = _joined(_values(self.folder / POSITIONS), _values(self.folder / PRESETS), self.folder)
+        try:
+            numbers = _numbers(_values(self.folder / PRESETS))
+            self.named = _joined(_values(self.folder / POSITIONS), numbers)
+        except ConfigError as error:
+            self._fault = error
+            raise
+        self._fault = None
+        self._only_presets = {name: number for name, number in numbers.items() if name not in self.named}
         return True
 
     def save(self, name: str, place: Place) -> None:
-        """Keeps a place under this name, and writes the files."""
-        self._write({**self.named, name: place})
+        """Keeps a place under this name, and writes the files; Refused when what stands there cannot be read."""
+        with self._to_be_written():
+            self._write({**self.named, name: place})
 
     def remove(self, name: str) -> None:
-        """Forgets a place, and writes the files; Refused when there is none of that name."""
-        found = self.find(name)
-        self._write({one: place for one, place in self.named.items() if one != found})
+        """Forgets a place, and writes the files; Refused when there is none of that name, or as `save`."""
+        with self._to_be_written():
+            found = self.find(name)
+            self._write({one: place for one, place in self.named.items() if one != found})
 
     def find(self, name: str) -> str:
         """The name as it is written: exactly, else without regard to case and blanks; Refused when there is none."""
@@ -76,7 +93,7 @@ class Places:
 
     def free_preset(self) -> int:
         """The lowest preset number that no place has."""
-        used = {place.preset for place in self.named.values()}
+        used = {*(place.preset for place in self.named.values()), *self._only_presets.values()}
         return next(number for number in range(1, len(used) + 2) if number not in used)
 
     def at(self, reading: Reading) -> str | None:
@@ -87,47 +104,66 @@ class Places:
                 return name
         return None
 
-    def _state(self) -> tuple[int, ...]:
+    def _state(self) -> tuple[object, ...]:
         files = (self.folder / POSITIONS, self.folder / PRESETS)
-        return tuple(file.stat().st_mtime_ns if file.exists() else 0 for file in files)
+        stats = [file.stat() if file.exists() else None for file in files]
+        return tuple((one.st_mtime_ns, one.st_ino, one.st_size) if one else None for one in stats)
+
+    @contextmanager
+    def _to_be_written(self) -> Iterator[None]:
+        """Nobody else writes meanwhile, and what was edited by hand a moment ago is not lost."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        folder = os.open(self.folder, os.O_RDONLY)
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX)
+            try:
+                self.reload()
+            except ConfigError as error:
+                self._fault = error
+            if self._fault is not None:
+                raise Refused(f"nothing is saved over a file that cannot be read: {self._fault.faults[0]}")
+            yield
+        finally:
+            os.close(folder)  # which ends the lock
 
     def _write(self, named: dict[str, Place]) -> None:
-        self.folder.mkdir(parents=True, exist_ok=True)
-        document.write(
-            self.folder / POSITIONS, {name: [place.pan, place.tilt, place.zoom] for name, place in named.items()}
-        )
-        document.write(
-            self.folder / PRESETS,
-            {name: place.preset for name, place in named.items() if place.preset is not None},
-        )
-        self.named = named
+        positions = {name: [place.pan, place.tilt, place.zoom] for name, place in named.items()}
+        presets = {name: place.preset for name, place in named.items() if place.preset is not None}
+        others = {name: number for name, number in self._only_presets.items() if name not in named}
+        document.write(self.folder / POSITIONS, positions)
+        document.write(self.folder / PRESETS, {**presets, **others})
+        self.named, self._only_presets = named, others
         self._read_at = self._state()
 
 
 def _values(file: Path) -> document.Document:
-    return document.read(file) if file.exists() else document.Document(file, {})
+    read = document.read(file, names=True) if file.exists() else document.Document(file, {})
+    if read.value is not None and not isinstance(read.value, dict):
+        read.fault((), f"expected places by name, got {str(read.value)[:80]!r}")
+    return read
 
 
-def _joined(positions: document.Document, presets: document.Document, folder: Path) -> dict[str, Place]:
+def _numbers(presets: document.Document) -> dict[str, int]:
+    """The camera's presets by name; ConfigError with file and line of every fault."""
+    values: dict[str, Any] = document.must(presets) or {}
+    for name, number in values.items():
+        if not isinstance(number, int) or isinstance(number, bool):
+            presets.fault((name,), f"expected the number of a preset, got {str(number)[:80]!r}")
+    return dict(document.must(presets) or {})
+
+
+def _joined(positions: document.Document, numbers: dict[str, int]) -> dict[str, Place]:
     """Both files as places; ConfigError with file and line of every fault."""
-    for source in (positions, presets):
-        if source.value is not None and not isinstance(source.value, dict):
-            source.fault((), f"expected places by name, got {str(source.value)[:80]!r}")
-    faults = [*positions.faults, *presets.faults]
-    if faults:
-        raise ConfigError(faults)
-    numbers = presets.value or {}
-    named = {str(name): _place(positions, name, value, numbers) for name, value in (positions.value or {}).items()}
-    if positions.faults:
-        raise ConfigError(positions.faults)
+    values: dict[str, Any] = document.must(positions) or {}
+    named = {name: _place(positions, name, value, numbers.get(name)) for name, value in values.items()}
+    document.must(positions)
     return {name: place for name, place in named.items() if place is not None}
 
 
-def _place(source: document.Document, name: Any, value: Any, numbers: dict[Any, Any]) -> Place | None:
-    number = numbers.get(name)
+def _place(source: document.Document, name: str, value: Any, preset: int | None) -> Place | None:
     if isinstance(value, list) and len(value) in (2, 3) and all(_is_number(one) for one in value):
         pan, tilt, zoom = (float(one) for one in (*value, 0.0)[:3])
-        return Place(pan=pan, tilt=tilt, zoom=zoom, preset=number if isinstance(number, int) else None)
+        return Place(pan=pan, tilt=tilt, zoom=zoom, preset=preset)
     source.fault((name,), f"expected [pan, tilt, zoom], got {str(value)[:80]!r}")
     return None
 

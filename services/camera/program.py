@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from services import document
-from services.camera.address import Address
 from services.camera.device import Device
 from services.camera.places import Places
 from services.camera.scan.analysis import Pool
@@ -14,6 +13,7 @@ from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
 from services.camera.watchdog import Watchdog, connector
+from services.camera.web.gate import Gate
 from services.errors import ConfigError
 from services.runner import Post
 from services.vision.lens import Lens
@@ -22,10 +22,11 @@ from services.vision.lens import Lens
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[CameraService]:
     """The service, with its threads to the camera; at the end a stop is sent and confirmed."""
-    address = Address(config.url, config.user, config.password, config.rtsp_port, config.channel)
+    address = config.address
     view = eye(config)
     watchdog = Watchdog(config.brand, address)
-    device = Device(connector(config.brand, address), post, turning=watchdog.tell)
+    gate = Gate(config.login_retry_s)
+    device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell)
     try:
         service = CameraService(config, device, lambda: Pool(post, config.workers), view)
         try:

@@ -5,7 +5,7 @@ The requests become a brand's own words in `brands/`; who may send them, and in 
     DeviceError
     ├── Refused     the camera answered, and said no
     ├── BadLogin    the camera does not know this user and password
-    ├── Locked      too many wrong passwords: the account is closed for a while
+    │   └── Locked  too many wrong passwords: the account is closed for a while
     └── Away        no answer, or one that makes no sense
 """
 
@@ -25,10 +25,14 @@ class Refused(DeviceError):
 
 
 class BadLogin(DeviceError):
-    """The camera does not know this user and password."""
+    """The camera does not know this user and password; nobody tries again for `again_s`."""
+
+    def __init__(self, text: str, again_s: float = 120.0) -> None:
+        super().__init__(text)
+        self.again_s = again_s
 
 
-class Locked(DeviceError):
+class Locked(BadLogin):
     """Too many wrong passwords: the account is closed for a while."""
 
 

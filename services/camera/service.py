@@ -16,6 +16,7 @@ from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
 from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.device import REPLY, Sender
+from services.camera.discovery import Discovery
 from services.camera.health import Health
 from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
 from services.camera.places import Places
@@ -43,7 +44,13 @@ class CameraService:
         self.config = config
         self.subscribes = tuple(
             topic.filter_for(cam=config.name)
-            for topic in (topics.CAMERA_ORDER, topics.CAMERA_POSITION_SET, topics.CAMERA_SNAPSHOT_GET)
+            for topic in (
+                topics.CAMERA_ORDER,
+                topics.CAMERA_POSITION_SET,
+                topics.CAMERA_SNAPSHOT_GET,
+                topics.HOMEASSISTANT_ENTITY,
+                topics.HOMEASSISTANT_STATUS,
+            )
         )
         self.due: float | None = 0.0
         self.counters: dict[str, int] = {"requests": 0, "failed_requests": 0, "frames": 0}
@@ -54,6 +61,8 @@ class CameraService:
         self.skill = Skill()
         self.skill.forget_senses(flip=config.picture.flip, mirror=config.picture.mirror)
         self.bulletin = Bulletin(config.name, self.health, self.places, publish)
+        self.bulletin.diagnostics = config.diagnostics
+        self.discovery = Discovery(config.name, publish, on=config.discovery)
         self.answers = Answers(config.name, publish, self.bulletin.position)
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
@@ -100,6 +109,7 @@ class CameraService:
         self.counters["frames"] = self.scanner.frames
         self.scanner.tick(now)
         self.bulletin.tick(now, self.counters)
+        self.discovery.tick(self.bulletin.identity, self.places.named)
         self.due = min(time for time in (self.bulletin.due, self.stage.due) if time is not None)
         return self._flush()
 
@@ -151,6 +161,8 @@ class CameraService:
         payload = read.payload
         if read.topic is topics.CAMERA_SNAPSHOT_GET:
             self.stage.begin(self.chores.snapshot(), now, _nobody)
+        elif read.topic in (topics.HOMEASSISTANT_ENTITY, topics.HOMEASSISTANT_STATUS):
+            self.discovery.hear(read)
         elif isinstance(payload, PositionSet):
             value = payload.model_dump(exclude={"id", "by"}, exclude_none=True)
             job = life.job("Position", value, payload.by, payload.id, read.message)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field, SecretStr, field_validator
+from pydantic import Field, SecretStr, field_validator, model_validator
 
+from services.camera.address import Address
 from services.camera.ptz.goal import Limits
 from services.section import Section
 from services.vision.frames import Mount
 
 Pair = tuple[float, float]
+LOW = {"diagnostics": False, "alarm": False, "frames": 1}  # for a small computer, as the report ran its Raspberry Pi
 
 
 class MarkerSizes(Section):
@@ -53,17 +55,22 @@ class Config(Section):
 
     name: str = "ip1"
     folder: Path = Path()
+    profile: Literal["full", "low"] = "full"  # "low": what is not given is as in LOW
     brand: str = "amcrest"  # a module of `camera/brands/`
     url: str
     rtsp_port: int = Field(default=554, ge=1, le=65535)
     user: str = ""
     password: SecretStr = SecretStr("")
+    login_retry_s: float = Field(default=120.0, ge=1)  # after a wrong password; doubles each time, up to 30 minutes
     channel: Literal[0, 1] | None = None  # of the motors; None: found out
     camera_info: Path | None = None  # of the upright picture at the widest zoom
     places: Path = Path("places")  # folder of the report's two files
     dictionary: str = "DICT_5X5_1000"
     markers: MarkerSizes = MarkerSizes()
     targets: tuple[int, ...] = ()
+    diagnostics: bool = True  # say how it fares, once a second
+    alarm: bool = True  # listen to the camera's own motion alarm
+    discovery: bool = False  # tell Home Assistant and openHAB what there is (`homeassistant/#`)
     picture: PictureOptions = PictureOptions()
     pan_dead_arc: Pair = (179.0, 186.0)  # readings that the camera cannot reach, degrees
     tilt_range: Pair = (-10.0, 108.0)
@@ -75,6 +82,13 @@ class Config(Section):
     stop_early: bool = True  # a scan ends when every target was seen where it shows best
     move_timeout_s: float = Field(default=60.0, gt=1, le=600)
     workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
+
+    @model_validator(mode="before")
+    @classmethod
+    def profile_gives_what_is_not_said(cls, values: Any) -> Any:
+        if isinstance(values, dict) and values.get("profile") == "low":
+            return {**LOW, **values}
+        return values
 
     @field_validator("url")
     @classmethod
@@ -97,6 +111,14 @@ class Config(Section):
         if pair[0] >= pair[1]:
             raise ValueError(f"expected [low, high], got {list(pair)}")
         return pair
+
+    @property
+    def address(self) -> Address:
+        """What every brand is given."""
+        return Address(
+            self.url, self.user, self.password, self.rtsp_port, self.channel,
+            self.pan_dead_arc, self.tilt_range, self.zoom_range,
+        )  # fmt: skip
 
     @property
     def limits(self) -> Limits:

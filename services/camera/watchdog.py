@@ -7,6 +7,7 @@ still turned, it sends the stop. It ignores the signals that end the service: it
 from __future__ import annotations
 
 import importlib
+import itertools
 import json
 import logging
 import signal
@@ -14,13 +15,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
-from typing import cast
+from typing import Protocol, cast
 
 from pydantic import SecretStr
 
 from services.camera.address import Address
 from services.camera.device import stand_still
 from services.camera.requests import Camera, Direction, Status
+from services.camera.web.gate import Gate
 from services.errors import DeviceError
 
 STILL = "-"
@@ -63,10 +65,19 @@ class Watchdog:
             log.error("the watchdog is gone, a crash would leave the camera turning: %s", error)
 
 
-def connector(brand: str, address: Address) -> Callable[[], Camera]:
-    """Makes connections to a camera of that brand."""
-    connect = cast(Callable[[Address], Camera], importlib.import_module(f"services.camera.brands.{brand}").connect)
-    return lambda: connect(address)
+class Connect(Protocol):
+    """What every brand's module offers under this name."""
+
+    def __call__(self, address: Address, gate: Gate, *, urgent: bool = False) -> Camera:
+        """A client; nothing is sent yet."""
+        ...
+
+
+def connector(brand: str, address: Address, gate: Gate) -> Callable[[], Camera]:
+    """Makes connections to a camera of that brand; the first one is for control."""
+    connect = cast(Connect, importlib.import_module(f"services.camera.brands.{brand}").connect)
+    number = itertools.count()
+    return lambda: connect(address, gate, urgent=next(number) == 0)
 
 
 def watch(lines: Iterable[str], connect: Callable[[], Camera], clock: Callable[[], float] = time.time) -> bool:
@@ -105,4 +116,4 @@ def main() -> None:
         return
     told = json.loads(first)
     address = Address(**{**told["address"], "password": SecretStr(told["address"]["password"])})
-    watch(sys.stdin, connector(told["brand"], address))
+    watch(sys.stdin, connector(told["brand"], address, Gate()))

@@ -13,14 +13,14 @@ from services.aside import Aside
 from services.bus.memory import Hub, MemoryBus
 from services.camera.address import Address
 from services.camera.brands.amcrest import Amcrest
+from services.camera.program import eye
 from services.camera.scan.analysis import Inline
 from services.camera.service import CameraService
-from services.camera.program import eye
+from services.camera.web.gate import Gate
 from services.client import FINAL, Client
 from services.config import Instance, load
 from services.payloads import OrderResult, PositionSet
 from services.runner import Post, Runner
-from services.simulators.camera.profiles import PROFILES
 from services.simulators.camera.program import Inside, inside
 from services.simulators.camera.settings import Config as CameraSimulator
 from services.topics import CAMERA_ORDER_RESULT, CAMERA_STATUS, SERVICE_STATUS, read
@@ -121,11 +121,11 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         simulator = self.apartment.instances["simulated-camera"].config
         assert isinstance(simulator, CameraSimulator)
         behind = inside(simulator, self.now)
-        address = Address(config.url, config.user, config.password, config.rtsp_port, config.channel)
-        link = Link(*(self._lane(simulator, behind, address, post) for _ in range(2)))
+        gate = Gate(clock=self.clock, pause=lambda seconds: None)
+        link = Link(*(self._lane(behind, config.address, post, gate) for _ in range(2)))
         self.links.append(link)
         return CameraService(config, link, lambda: Inline(post), eye(config))
 
-    def _lane(self, simulator: CameraSimulator, behind: Inside, address: Address, post: Post) -> Lane:
-        wire = Wire(behind, PROFILES[simulator.profile], simulator.seed)
-        return Lane(Amcrest(address, wire), wire, post, self.clock)
+    def _lane(self, behind: Inside, address: Address, post: Post, gate: Gate) -> Lane:
+        wire = Wire(behind)
+        return Lane(Amcrest(address, wire, gate), wire, post, self.clock)

@@ -5,22 +5,18 @@ The camera behind it is the simulator's own inside; the real wire is `simulators
 
 from __future__ import annotations
 
-from random import Random
-
 import httpx
 
 from services.simulators.camera.messages import read
-from services.simulators.camera.profiles import Profile
 from services.simulators.camera.program import Inside
 
 
 class Wire(httpx.BaseTransport):
     """`now` goes on with every request, by the time that the camera takes for it."""
 
-    def __init__(self, inside: Inside, profile: Profile, seed: int) -> None:
-        self.inside, self.profile = inside, profile
+    def __init__(self, inside: Inside) -> None:
+        self.inside = inside
         self.now = 0.0
-        self._rng = Random(seed)
 
     def handle_request(self, request: httpx.Request) -> httpx.Response:
         """One request and its answer; authentication as on the real wire."""
@@ -32,14 +28,12 @@ class Wire(httpx.BaseTransport):
         return self._picture() if "/snapshot.cgi" in target else self._control(target)
 
     def _picture(self) -> httpx.Response:
-        self.now += self.profile.snapshot_s
+        self.now += self.inside.device.latency.snapshot()
         content = self.inside.pictures.jpeg("MainFormat", self.now)
         return httpx.Response(200, headers={"Content-Type": "image/jpeg"}, content=content)
 
     def _control(self, target: str) -> httpx.Response:
-        """A command acts when it has been processed; a status tells how it was when asked."""
-        request, asked = read(target), self.now
-        spread = self.profile.latency_spread_s
-        self.now += self.profile.latency_s + self._rng.uniform(-spread, spread)
-        answer = self.inside.device.answer(request, asked if request.action.startswith("get") else self.now)
+        """A request acts when it has been processed."""
+        self.now += self.inside.device.latency.control()
+        answer = self.inside.device.answer(read(target), self.now)
         return httpx.Response(answer.status, headers={"Content-Type": answer.content_type}, content=answer.body)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from services.camera.places import Places
+from services.camera.places import Places, name_of
 from services.camera.requests import Reading, Refused
 from services.errors import ConfigError
 from services.payloads import Place
@@ -69,3 +72,107 @@ def test_an_unknown_place_is_refused_with_those_that_there_are(tmp_path: Path) -
     places.save("Front", Place(pan=1.0, tilt=2.0))
     with pytest.raises(Refused, match="no place 'Back'; there are: Front"):
         places.get("Back")
+
+
+ODD = [
+    "yes", "No", "null", "~", "007", "1.50", "1e3", "2026-01-31", "true", "<<", "=", "- x", "-", "? x", "a: b", "#c",
+    "'q'", '"', "%TAG", "@x", "`x", "{a}", "[b]", "&a", "*b", "!c", "|", ">", "Wohnküche", "厨房", "مطبخ",
+    "👩\u200d🍳", "a\u00a0b", "Sofa, left", "\\n", "é" * 80,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_a_place_may_have_any_name_and_is_read_back_under_it(tmp_path: Path, name: str) -> None:
+    assert name_of(name) == name
+    Places(tmp_path).save(name, Place(pan=1.0, tilt=2.0, preset=7))
+    again = Places(tmp_path)
+    assert again.named == {name: Place(pan=1.0, tilt=2.0, preset=7)}
+    again.remove(name)
+    assert Places(tmp_path).named == {}
+
+
+@given(st.text(max_size=90))
+def test_what_passes_for_a_name_survives_the_file(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    try:
+        name = name_of(text)
+    except ValueError:
+        return
+    folder = tmp_path_factory.mktemp("places")
+    Places(folder).save(name, Place(pan=1.0, tilt=2.0, preset=7))
+    assert Places(folder).named == {name: Place(pan=1.0, tilt=2.0, preset=7)}
+
+
+@pytest.mark.parametrize("text", ["", "  ", "a\nb", "a\tb", "\x00", "a\x7f", "a\x85b", "\u2028", "x" * 81, "\ud800"])
+def test_control_characters_and_nothing_at_all_are_no_name(text: str) -> None:
+    if text == "\u2028":
+        text = "a\u2028b"
+    with pytest.raises(ValueError, match="no control characters"):
+        name_of(text)
+
+
+def test_names_written_by_hand_without_quotes_are_what_they_look_like(tmp_path: Path) -> None:
+    (tmp_path / "preset_position.yaml").write_text(
+        "007: [1, 2, 0]\nyes: [3, 4, 0]\n~: [5, 6, 0]\n2026-01-31: [7, 8, 0]\n"
+    )
+    (tmp_path / "preset_coords.yaml").write_text("'007': 3\n\"yes\": 4\n")
+    named = Places(tmp_path).named
+    assert list(named) == ["007", "yes", "~", "2026-01-31"]
+    assert (named["007"].preset, named["yes"].preset) == (3, 4)
+
+
+@pytest.mark.parametrize("text", ["Kitchen: three\n", "Kitchen: true\n", "Kitchen: [3]\n", "- 3\n", "? [a]\n: 3\n"])
+def test_a_fault_in_the_file_of_presets_is_told_with_its_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / "preset_coords.yaml").write_text(text)
+    with pytest.raises(ConfigError, match=r"preset_coords.yaml:1: "):
+        Places(tmp_path)
+
+
+def test_a_preset_without_a_position_stays_in_its_file_and_its_number_is_not_used_again(tmp_path: Path) -> None:
+    (tmp_path / "preset_coords.yaml").write_text("Balcony: 1\n")
+    places = Places(tmp_path)
+    assert places.named == {}
+    places.save("Sofa", Place(pan=1.0, tilt=2.0, preset=places.free_preset()))
+    assert (tmp_path / "preset_coords.yaml").read_text() == "Sofa: 2\nBalcony: 1\n"
+    places.save("Balcony", Place(pan=3.0, tilt=4.0, preset=1))
+    assert Places(tmp_path).named["Balcony"] == Place(pan=3.0, tilt=4.0, preset=1)
+
+
+def test_a_place_that_was_added_by_hand_a_moment_ago_is_not_lost(tmp_path: Path) -> None:
+    places = Places(tmp_path)
+    places.save("One", Place(pan=1.0, tilt=2.0))
+    with (tmp_path / "preset_position.yaml").open("a") as file:
+        file.write("Two: [5, 6, 0]\n")
+    places.save("Three", Place(pan=3.0, tilt=4.0))
+    assert list(Places(tmp_path).named) == ["One", "Two", "Three"]
+
+
+def test_nothing_is_saved_over_a_file_that_was_spoilt_by_hand(tmp_path: Path) -> None:
+    places = Places(tmp_path)
+    places.save("One", Place(pan=1.0, tilt=2.0))
+    (tmp_path / "preset_position.yaml").write_text("One: [1, 2\n")
+    with pytest.raises(ConfigError):
+        places.reload()
+    for _ in range(2):
+        with pytest.raises(Refused, match=r"cannot be read: .*preset_position.yaml:\d+:"):
+            places.save("Two", Place(pan=3.0, tilt=4.0))
+    assert (tmp_path / "preset_position.yaml").read_text() == "One: [1, 2\n"
+    (tmp_path / "preset_position.yaml").write_text("One: [1, 2]\n")
+    places.save("Two", Place(pan=3.0, tilt=4.0))
+    assert list(Places(tmp_path).named) == ["One", "Two"]
+
+
+def save_many(folder: Path, first: int) -> None:
+    places = Places(folder)
+    for number in range(first, first + 20):
+        places.save(f"Place {number}", Place(pan=float(number), tilt=0.0))
+
+
+def test_two_processes_that_save_at_once_lose_nothing_of_each_other(tmp_path: Path) -> None:
+    context = multiprocessing.get_context("spawn")
+    others = [context.Process(target=save_many, args=(tmp_path, first)) for first in (0, 100)]
+    for one in others:
+        one.start()
+    for one in others:
+        one.join(30)
+    assert [one.exitcode for one in others] == [0, 0]
+    assert len(Places(tmp_path).named) == 40

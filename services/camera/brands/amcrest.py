@@ -28,13 +28,21 @@ from services.camera.requests import (
 )
 from services.camera.web.connection import COMMAND, SNAPSHOT, connection, fetch
 from services.camera.web.digest import Login
+from services.camera.web.gate import Gate
 
 
 class Amcrest:
     """A Camera; `channel` None: found out by asking for the status with 1, then 0."""
 
-    def __init__(self, address: Address, transport: httpx.BaseTransport | None = None) -> None:
-        self.login = Login(address.user, address.password)
+    def __init__(
+        self,
+        address: Address,
+        transport: httpx.BaseTransport | None = None,
+        gate: Gate | None = None,
+        *,
+        urgent: bool = False,
+    ) -> None:
+        self.login = Login(address.user, address.password, gate or Gate(), urgent=urgent)
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
         self.running: Direction | None = None
@@ -143,6 +151,6 @@ class Amcrest:
         return Identity(model, serial, system.read_version(self._get(system.magic("getSoftwareVersion")).text))
 
 
-def connect(address: Address) -> Camera:
-    """A client for the camera there; nothing is sent yet."""
-    return Amcrest(address)
+def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:
+    """A client for the camera there; nothing is sent yet. `urgent`: it is the one that moves the motors."""
+    return Amcrest(address, gate=gate, urgent=urgent)

@@ -1,7 +1,7 @@
 """HTTP Digest and Basic authentication that reuses the camera's challenge (RFC 7616, RFC 2617).
 
-The last challenge is tried again with the next count. On a 401 the new challenge is taken once and the request
-repeated; a second 401 goes to the caller. Never a loop: wrong passwords lock the account.
+The last challenge is tried again with the next count. On a 401 the new challenge is taken and the request repeated;
+after a second 401 once more half a second later. How many logins may fail at all is decided in `gate.py`.
 """
 
 from __future__ import annotations
@@ -11,11 +11,18 @@ import re
 import secrets
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
+from typing import Literal
 
 import httpx
 from pydantic import SecretStr
 
+from services.camera.web.gate import ODD_S, Gate
+from services.errors import DeviceError
+
 _FIELD = re.compile(r'(\w+)\s*=\s*(?:"([^"]*)"|([^\s,]+))')
+_STALE = re.compile(r"stale\s*=\s*\"?true", re.IGNORECASE)
+MOST_SENDS = 6  # of one request: bare, old nonce, new, new after a while, and a stale one or two between them
+VAIN, SELDOM = 4, 100  # old nonces refused in a row until they are no longer tried; then one in so many requests
 HASHES = {"md5": hashlib.md5, "sha-256": hashlib.sha256}
 
 
@@ -86,33 +93,105 @@ def authorization(challenge: Challenge, user: str, password: str, method: str, u
     return "Digest " + ", ".join(fields)
 
 
+@dataclass
+class Nonces:
+    """Whether this firmware takes a nonce more than once, learnt from what it does."""
+
+    vain: int = 0  # uses of an old nonce in a row that were refused
+    skipped: int = 0
+
+    def worth_a_try(self) -> bool:
+        """Whether to send an old nonce; seldom where that was always refused: firmware gets updates."""
+        if self.vain < VAIN:
+            return True
+        self.skipped = (self.skipped + 1) % SELDOM
+        return self.skipped == 0
+
+    def used(self, *, passed: bool) -> None:
+        """An old nonce was sent."""
+        self.vain = 0 if passed else self.vain + 1
+
+
 class Login(httpx.Auth):
-    """One account; keeps the last challenge. `refused` counts 401 answers, for the diagnostics."""
+    """One connection's way through the gate; keeps the last challenge. `refused` counts 401 answers.
+
+    `urgent`: it carries the orders to the motors, which do not wait for other connections.
+    """
 
     def __init__(
-        self, user: str, password: SecretStr, cnonce: Callable[[], str] = lambda: secrets.token_hex(8)
+        self,
+        user: str,
+        password: SecretStr,
+        gate: Gate,
+        cnonce: Callable[[], str] = lambda: secrets.token_hex(8),
+        *,
+        urgent: bool = False,
     ) -> None:
         self.user = user
         self.password = password
+        self.gate = gate
         self.cnonce = cnonce
+        self.urgent = urgent
         self.challenge: Challenge | None = None
+        self.nonces = Nonces()
         self.refused = 0
 
     def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
-        """Sends with what is known, and once more with a new challenge."""
-        if self.challenge is not None:
-            self._sign(request, self.challenge)
-        response = yield request
-        if response.status_code != 401:
-            return
-        self.refused += 1
-        self.challenge = read_challenge(response.headers.get_list("www-authenticate"))
-        if self.challenge is None:
-            return
-        self._sign(request, self.challenge)
-        response = yield request
-        if response.status_code == 401:
+        """Sends with what is known, after a refusal with the new challenge, and after one more refusal once again.
+
+        BadLogin or Locked when the gate is closed, or closes; a 401 that proves nothing goes to the caller.
+        """
+        self._enter()
+        refusals = 0
+        for _ in range(MOST_SENDS):
+            if self.challenge is None:
+                request.headers.pop("Authorization", None)
+                outcome = self._read((yield request))
+                if outcome == "passed" or self.challenge is None:
+                    return
+                continue
+            if refusals:
+                self.gate.check()
+                self.gate.pause(ODD_S)
+            old = self.challenge.count > 0
+            with self.gate.login(urgent=self.urgent) as login:
+                self._sign(request, self.challenge)
+                outcome = self._read((yield request))
+                if outcome == "passed":
+                    login.passed()
+                elif outcome == "refused":
+                    login.failed(sure=refusals > 0)
+            if old:
+                self.nonces.used(passed=outcome == "passed")
+            if outcome == "passed":
+                return
+            refusals += outcome == "refused" and not old
+        self.gate.check()
+
+    def _enter(self) -> None:
+        """After a time at the closed gate the first request goes bare: it tells whether the account is still locked."""
+        try:
+            self.gate.check()
+        except DeviceError:
             self.challenge = None
+            raise
+        if self.challenge is not None and self.challenge.count > 0 and not self.nonces.worth_a_try():
+            self.challenge = None
+
+    def _read(self, response: httpx.Response) -> Literal["passed", "stale", "refused"]:
+        """What an answer says of the login, and the challenge in it; Locked when it says that. Stale: another nonce."""
+        if response.status_code != 401:
+            return "passed"
+        self.refused += 1
+        text = response.read()[:200]
+        if b"User Locked" in text:
+            self.challenge = None
+            raise self.gate.locked()
+        if b"Invalid Authority" in text:
+            return "passed"
+        headers = response.headers.get_list("www-authenticate")
+        self.challenge = read_challenge(headers)
+        return "stale" if any(_STALE.search(header) for header in headers) else "refused"
 
     def _sign(self, request: httpx.Request, challenge: Challenge) -> None:
         secret = self.password.get_secret_value()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from random import Random
 from threading import RLock
 
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.events import Events
+from services.simulators.camera.latency import Latency
 from services.simulators.camera.messages import OK, Answer, Request, lines, refusal
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.profiles import Profile
@@ -20,10 +22,11 @@ Program = Callable[[Request, float], Answer]
 class Device:
     """One camera; safe for several threads, each call is one step."""
 
-    def __init__(self, camera: WorldCamera, profile: Profile, now: float) -> None:
+    def __init__(self, camera: WorldCamera, profile: Profile, now: float, latency: Latency | None = None) -> None:
         self.camera, self.profile = camera, profile
+        self.latency = latency or Latency(profile, None, Random(1))
         self.tables = Tables(profile, camera.lens)
-        self.ptz = Ptz(camera, profile, self.tables, now)
+        self.ptz = Ptz(camera, profile, self.tables, self.latency, now)
         self.events = Events()
         self.boots_until = float("-inf")
         self._lock = RLock()
@@ -51,6 +54,11 @@ class Device:
         with self._lock:
             self.ptz.motors.place(pose, now)
 
+    def step(self, act: Callable[[], Answer]) -> Answer:
+        """Something that another program of the camera does, undisturbed by the others."""
+        with self._lock:
+            return act()
+
     def booting(self, now: float) -> bool:
         """Whether it is restarting and answers nobody."""
         return now < self.boots_until
@@ -68,10 +76,10 @@ class Device:
             "getVendor": ["vendor=Amcrest"],
         }
         if request.action == "reboot":
-            return self._reboot(now)
+            return self.reboot(now)
         return lines(facts[request.action]) if request.action in facts else refusal(profile)
 
-    def _reboot(self, now: float) -> Answer:
+    def reboot(self, now: float) -> Answer:
         """Presets and configuration stay; the motors return to where they are after power-on."""
         self.boots_until = now + self.profile.boot_s
         self.ptz.motors.place(Pose(*self.camera.starts_at), now)

@@ -6,25 +6,25 @@ import socket
 import struct
 import sys
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Generator
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from random import Random
 from socketserver import TCPServer
 from threading import Event, Lock
 from typing import Any
 
-from services.simulators.camera import events
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, Verdict
+from services.simulators.camera.endless import ENDLESS
 from services.simulators.camera.messages import Answer, Request, read, refusal
-from services.simulators.camera.view.picture import Pictures, Stream
+from services.simulators.camera.onvif.service import Onvif
+from services.simulators.camera.view.picture import Pictures
 
 IMAGE = "image/jpeg"
 LOG_LENGTH = 2000
-HEARTBEATS_S = (1.0, 60.0)
+SOAP_BYTES = 1 << 20
 ROOT = b"<html><head><title>WEB</title></head><body></body></html>"
 
 
@@ -66,20 +66,18 @@ class CameraServer(Port):
     ) -> None:
         super().__init__(address, Connection)
         self.device, self.door, self.pictures, self.clock = device, door, pictures, clock
-        self.latency_s, self.spread_s = device.profile.latency_s, device.profile.latency_spread_s
-        self.snapshot_s = device.profile.snapshot_s
         self.cuts: list[Callable[[], None]] = []  # how the connections of other ports are cut
         self.closing, self.faults, self.log = Event(), Faults(), deque[dict[str, Any]](maxlen=LOG_LENGTH)
         self.running = Event()  # cleared while frozen
         self.running.set()
         self.control, self.snapshot, self._lock = Lock(), Lock(), Lock()
         self._open: set[socket.socket] = set()
-        self._rng = Random(1)
+        self.onvif: Onvif | None = None
 
-    def delay(self, seconds: float, spread: float = 0.0) -> None:
+    def delay(self, seconds: float) -> None:
         """Waits as long as the camera needs, or until it is switched off."""
         if seconds > 0:
-            self.closing.wait(seconds + self._rng.uniform(-spread, spread))
+            self.closing.wait(seconds)
 
     def judge(self, method: str, target: str, header: str | None) -> Verdict:
         """The door's verdict, one request at a time."""
@@ -172,6 +170,8 @@ class Connection(BaseHTTPRequestHandler):
             return self._fail(fault, entry)
         if self.path == "/":
             return self._send(Answer(ROOT, content_type="text/html"), entry)
+        if self.path.startswith("/onvif/"):
+            return self._soap(entry)
         verdict = self.server.judge(self.command, self.path, self.headers.get("Authorization"))
         if verdict.passed:
             return self._serve(read(self.path), entry)
@@ -180,69 +180,56 @@ class Connection(BaseHTTPRequestHandler):
     do_POST = do_GET  # noqa: N815 (the base class looks for these names)
 
     def _serve(self, request: Request, entry: dict[str, Any]) -> None:
-        special = {("snapshot", ""): self._snapshot, ("mjpg/video", ""): self._video}
-        special[("eventManager", "attach")] = self._events
-        how = special.get((request.cgi, request.action), self._control)
-        how(request, entry)
+        endless = ENDLESS.get((request.cgi, request.action))
+        if endless is not None:
+            self._endless(endless(self.server, request), entry)
+        elif request.cgi == "snapshot":
+            self._snapshot(request, entry)
+        else:
+            self._control(request, entry)
 
     def _control(self, request: Request, entry: dict[str, Any]) -> None:
-        """One at a time. A command acts when it has been processed; a status tells how it was when asked."""
+        """One at a time, and it acts when it has been processed."""
+        encoders = self.server.device.tables.encoders
         with self.server.control:
-            reads, encoders = request.action.startswith("get"), self.server.device.tables.encoders
-            answer = self.server.device.answer(request, self.server.clock()) if reads else None
-            self.server.delay(self.server.latency_s, self.server.spread_s if self.server.latency_s else 0.0)
-            answer = answer or self.server.device.answer(request, self.server.clock())
+            self.server.delay(self.server.device.latency.control())
+            answer = self.server.device.answer(request, self.server.clock())
         self._send(answer, entry)
         if self.server.device.booting(self.server.clock()):
             self.server.drop()
         elif self.server.device.tables.encoders != encoders:
             self.server.cut_streams()
 
+    def _soap(self, entry: dict[str, Any]) -> None:
+        """ONVIF checks logins itself, message by message."""
+        onvif, clock = self.server.onvif, self.server.clock
+        if onvif is None or self.command != "POST":
+            return self._send(Answer(b"", 404), entry)
+        length = self.headers.get("Content-Length", "")
+        body, host = self.rfile.read(min(int(length), SOAP_BYTES) if length.isdigit() else 0), self.headers["Host"]
+        with self.server.control:
+            self.server.delay(self.server.device.latency.control())
+            answer = self.server.device.step(lambda: onvif.answer(body, host, clock()))
+        self._send(answer, entry)
+        if self.server.device.booting(clock()):
+            self.server.drop()
+
     def _snapshot(self, request: Request, entry: dict[str, Any]) -> None:
         """Overlapping snapshots fail."""
         if not self.server.snapshot.acquire(blocking=False):
             return self._send(refusal(self.server.device.profile), entry)
         try:
-            self.server.delay(self.server.snapshot_s if self.server.latency_s else 0.0)
+            self.server.delay(self.server.device.latency.snapshot())
             data = self.server.pictures.jpeg("MainFormat", self.server.clock())
         finally:
             self.server.snapshot.release()
         return self._send(Answer(data, content_type=IMAGE), entry)
 
-    def _video(self, request: Request, entry: dict[str, Any]) -> None:
-        stream: Stream = "ExtraFormat" if request.text("subtype", "0") != "0" else "MainFormat"
-        kind = f"multipart/x-mixed-replace; boundary={events.BOUNDARY}"
+    def _endless(self, chunks: Generator[bytes], entry: dict[str, Any]) -> None:
         entry["status"] = 200
-        self._write(f"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Type: {kind}\r\n\r\n".encode())
-        encoders = self.server.device.tables.encoders
-        while not self.server.closing.wait(1 / self.server.pictures.fps(stream)):
-            if self.server.device.tables.encoders != encoders:
-                return
-            if self.server.shows_pictures:
-                self._write(self._part(stream))
-
-    def _part(self, stream: Stream) -> bytes:
-        data = self.server.pictures.jpeg(stream, self.server.clock())
-        head = f"--{events.BOUNDARY}\r\nContent-Type: {IMAGE}\r\nContent-Length: {len(data)}\r\n\r\n"
-        return head.encode() + data + b"\r\n"
-
-    def _events(self, request: Request, entry: dict[str, Any]) -> None:
-        least, most = HEARTBEATS_S
-        beat = request.text("heartbeat")
-        every = min(max(float(beat), least), most) if beat.isdigit() else most
-        subscription = self.server.device.events.subscribe(events.wanted(request.text("codes")))
-        entry["status"] = 200
-        try:
-            self._write(events.START)
-            while not self.server.closing.is_set():
-                text = subscription.next(every)
-                self.server.running.wait()
-                if text == "":
-                    return
-                if text or (beat and self.server.device.profile.heartbeat):
-                    self._write(events.part(text or "Heartbeat"))
-        finally:
-            self.server.device.events.leave(subscription)
+        with closing(chunks):
+            for chunk in chunks:
+                self._write(chunk)
 
     def _challenge(self, verdict: Verdict, entry: dict[str, Any]) -> None:
         entry["status"] = 401

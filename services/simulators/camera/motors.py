@@ -1,19 +1,24 @@
-"""Pan, tilt and digital zoom: what moves, how far, and where that is. Pure; the time comes in.
+"""Pan, tilt and digital zoom: what moves, where that is, and what has been asked of it. Pure; the time comes in.
 
 Pan is kept as its travel `p`, degrees from one end stop's side; the camera reads (180 - p) mod 360. So the dead arc
-of readings, which the camera can never cross, is simply what lies outside the travel.
+of readings, which the camera can never cross, is simply what lies outside the travel. How one motor moves is in
+`track`.
 """
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import NamedTuple
 
 from services.simulators.camera.profiles import Profile
+from services.simulators.camera.track import Moment, Rail, Track, go, run, stand
 from services.simulators.true_camera import WorldCamera
 
 ZOOM_MAX = 8.0
-MOMENT_S = 1e-3
+REMEMBERED_S = 10.0  # how far back a status may look
 ZOOM_STEP = 2.0  # the status tells five levels apart: 0, 2, 4, 6, 8
 # signs of travel, tilt and zoom of each code, in a picture that is neither flipped nor mirrored
 CODES: dict[str, tuple[int, int, int]] = {
@@ -41,18 +46,32 @@ class Pose(NamedTuple):
 class Axes(NamedTuple):
     """One number for each motor: travel of pan and tilt in degrees (or degrees/s), zoom in levels (or levels/s)."""
 
-    travel: float
+    pan: float
     tilt: float
     zoom: float
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What the motors are doing: with speeds until stopped, or towards a goal with at most these speeds."""
+    """What the motors do since a command: its code, and a track for pan (its travel), tilt and zoom each."""
 
     code: str
-    speeds: Axes
-    goal: Axes | None = None
+    began: float
+    tracks: tuple[Track, Track, Track]
+
+
+@dataclass(frozen=True)
+class Worked:
+    """What the motors have done: how far each went, how long each was pushed against an end stop, motions begun."""
+
+    travelled: Axes
+    pushed_s: Axes
+    motions: int
+
+
+def travel(pose: Pose) -> Axes:
+    """The motors' positions at readings."""
+    return Axes((180.0 - pose.pan) % 360.0, pose.tilt, pose.zoom)
 
 
 def magnification(zoom: float) -> float:
@@ -66,88 +85,99 @@ def reading(pose: Pose) -> Pose:
 
 
 class Motors:
-    """Holds the position and what moves. Every call brings it to `now` first, which must not go back."""
+    """Three motors on their rails, and what they were told last; times must not go back, but the past can be seen."""
 
     def __init__(self, camera: WorldCamera, profile: Profile, now: float) -> None:
-        low, high = camera.pan_dead_arc
-        self._least = Axes((180.0 - low) % 360.0, camera.tilt_range[0], 0.0)
-        self._most = Axes((180.0 - high) % 360.0, camera.tilt_range[1], ZOOM_MAX)
-        self._profile, self._now = profile, now
-        self._fastest = self._speeds(8, 8, profile.zoom_speed)
-        self.motion: Motion | None = None
-        self._at = self._within(self.travel(Pose(*camera.starts_at)))
+        self.rails = rails(camera, profile)
+        self._past: deque[Motion] = deque()
+        self._travelled = self._pushed = Axes(0.0, 0.0, 0.0)
+        self._motions = 0
+        self.place(Pose(*camera.starts_at), now)
 
-    def travel(self, pose: Pose) -> Axes:
-        """The axes' positions at readings."""
-        return Axes((180.0 - pose.pan) % 360.0, pose.tilt, pose.zoom)
+    def pose(self, at: float) -> Pose:
+        """Where the motors truly stood at that time."""
+        pan, tilt, zoom = (moment.position for moment in self._moments(at))
+        return Pose((180.0 - pan) % 360.0, tilt, zoom)
 
-    def pose(self, now: float) -> Pose:
-        """Where the motors truly stand."""
-        self.advance(now)
-        return Pose((180.0 - self._at.travel) % 360.0, self._at.tilt, self._at.zoom)
+    def rates(self, at: float) -> Pose:
+        """How fast the readings changed: degrees/s, levels/s; zero on an axis that stands."""
+        pan, tilt, zoom = (moment.speed for moment in self._moments(at))
+        return Pose(-pan, tilt, zoom)
 
-    def rates(self, now: float) -> Pose:
-        """How fast the readings change: degrees/s, levels/s; zero on an axis that stands."""
-        self.advance(now)
-        if self.motion is None:
-            return Pose(0.0, 0.0, 0.0)
-        travel, tilt, zoom = (
-            (b - a) / MOMENT_S for a, b in zip(self._at, self._after(self.motion, MOMENT_S)[0], strict=True)
-        )
-        return Pose(-travel, tilt, zoom)
-
-    def advance(self, now: float) -> None:
-        """Moves on to `now`; a motion that has reached its goal or its end stops is over."""
-        seconds, self._now = max(now - self._now, 0.0), max(now, self._now)
-        if self.motion is not None:
-            self._at, ended = self._after(self.motion, seconds)
-            self.motion = None if ended else self.motion
+    def worked(self, now: float) -> Worked:
+        """What they have done so far."""
+        tracks = self._past[-1].tracks
+        travelled = (old + track.travelled(now) for old, track in zip(self._travelled, tracks, strict=True))
+        pushed = (old + track.pushed(now) for old, track in zip(self._pushed, tracks, strict=True))
+        return Worked(Axes(*travelled), Axes(*pushed), self._motions)
 
     def start(self, code: str, vertical: int, horizontal: int, now: float, *, flip: bool, mirror: bool) -> bool:
         """Begins to turn or zoom until stopped, instead of what it did; False when the camera ignores that."""
-        self.advance(now)
-        travel, tilt, zoom = CODES[code]
-        if not zoom and (horizontal < 1 or (travel and tilt and vertical < 1)):
+        pan, tilt, zoom = CODES[code]
+        if not zoom and (horizontal < 1 or (pan and tilt and vertical < 1)):
             return False
-        speeds = self._speeds(horizontal, vertical if travel and tilt else horizontal, self._profile.zoom_speed)
-        signs = Axes(-travel if mirror else travel, -tilt if flip else tilt, zoom)
-        self.motion = Motion(code, Axes(*(a * b for a, b in zip(speeds, signs, strict=True))))
+        signs = Axes(-pan if mirror else pan, -tilt if flip else tilt, zoom)
+        levels = (horizontal, vertical if pan and tilt else horizontal, 1)
+        speeds = (sign * rail.speed(level) for sign, rail, level in zip(signs, self.rails, levels, strict=True))
+        self.turn(code, Axes(*speeds), now)
         return True
 
-    def stop(self, code: str, now: float) -> None:
-        """Ends the motion that was started with this code, and no other."""
-        self.advance(now)
-        if self.motion is not None and self.motion.code == code:
-            self.motion = None
+    def turn(self, code: str, speeds: Axes, now: float, seconds: float = inf) -> None:
+        """Begins to turn with these speeds (of travel, tilt and zoom), for so long or until stopped."""
+        self._begin(code, now, lambda axis, rail, at: run(rail, at, now, speeds[axis], seconds))
+        self._motions += 1
 
-    def go(self, goal: Pose, now: float) -> None:
+    def stop(self, code: str, now: float) -> None:
+        """Slows down the motion that was started with this code, and no other."""
+        if self._past[-1].code == code:
+            self.halt(now)
+
+    def go(self, goal: Pose, now: float, code: str = "GotoPreset", level: int = 8) -> None:
         """Drives all axes to a pose, clamped to the stops; never through the dead arc."""
-        self.advance(now)
-        self.motion = Motion("goto", self._fastest, self._within(self.travel(goal)))
+        self.drive(travel(goal), now, code, level)
+
+    def drive(self, goal: Axes, now: float, code: str, level: int = 8) -> None:
+        """The same, to positions of the motors."""
+        self._begin(code, now, lambda axis, rail, at: go(rail, at, now, goal[axis], rail.speed(level)))
+        self._motions += 1
 
     def halt(self, now: float) -> None:
-        """Ends whatever moves (power off)."""
-        self.advance(now)
-        self.motion = None
+        """Slows down whatever moves."""
+        self._begin("", now, lambda axis, rail, at: run(rail, at, now, 0.0))
 
     def place(self, pose: Pose, now: float) -> None:
-        """Puts the camera there at once (the tests' side door)."""
-        self.halt(now)
-        self._at = self._within(self.travel(pose))
+        """Puts the camera there at once, at rest, as if it had always been there (power-on, the tests' side door)."""
+        if self._past:
+            self._note(now)
+        self._past.clear()
+        pan, tilt, zoom = (stand(rail.within(at), now) for rail, at in zip(self.rails, travel(pose), strict=True))
+        self._past.append(Motion("", now, (pan, tilt, zoom)))
 
-    def _speeds(self, pan: int, tilt: int, zoom: float) -> Axes:
-        return Axes(self._profile.speed(pan), self._profile.speed(tilt) * self._profile.tilt_share, zoom)
+    def _moments(self, at: float) -> list[Moment]:
+        motion = next((motion for motion in reversed(self._past) if motion.began <= at), self._past[0])
+        moments = (track.at(max(at, motion.began)) for track in motion.tracks)
+        return [Moment(rail.within(place), speed) for rail, (place, speed) in zip(self.rails, moments, strict=True)]
 
-    def _after(self, motion: Motion, seconds: float) -> tuple[Axes, bool]:
-        """Where the axes are after so long, and whether they then stand for good."""
-        if motion.goal is None:
-            there = self._within(Axes(*(a + v * seconds for a, v in zip(self._at, motion.speeds, strict=True))))
-            on = zip(there, motion.speeds, self._least, self._most, strict=True)
-            return there, all(at == (low if v < 0 else high) for at, v, low, high in on if v)
-        steps = zip(self._at, motion.goal, motion.speeds, strict=True)
-        there = Axes(*(goal if abs(goal - at) <= v * seconds else at + (v if goal > at else -v) * seconds
-                       for at, goal, v in steps))  # fmt: skip
-        return there, there == motion.goal
+    def _begin(self, code: str, now: float, track: Callable[[int, Rail, Moment], Track]) -> None:
+        now_at = self._moments(now)
+        self._note(now)
+        pan, tilt, zoom = (track(axis, self.rails[axis], now_at[axis]) for axis in range(3))
+        self._past.append(Motion(code, now, (pan, tilt, zoom)))
+        while len(self._past) > 1 and self._past[1].began < now - REMEMBERED_S:
+            self._past.popleft()
 
-    def _within(self, axes: Axes) -> Axes:
-        return Axes(*(min(max(a, low), high) for a, low, high in zip(axes, self._least, self._most, strict=True)))
+    def _note(self, now: float) -> None:
+        """Keeps the sums of the motion that ends now."""
+        worked = self.worked(now)
+        self._travelled, self._pushed = worked.travelled, worked.pushed_s
+
+
+def rails(camera: WorldCamera, profile: Profile) -> tuple[Rail, Rail, Rail]:
+    """The motors of a camera with this firmware: pan (its travel), tilt and zoom."""
+    low, high = camera.pan_dead_arc
+    tilt_speeds = tuple(speed * profile.tilt_share for speed in profile.pan_speeds)
+    return (
+        Rail((180.0 - low) % 360.0, (180.0 - high) % 360.0, profile.pan_speeds, profile.pan_acceleration),
+        Rail(*camera.tilt_range, tilt_speeds, profile.tilt_acceleration),
+        Rail(0.0, ZOOM_MAX, (profile.zoom_speed,), profile.zoom_acceleration),
+    )

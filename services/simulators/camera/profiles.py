@@ -31,18 +31,20 @@ class Profile:
     daynight: Literal["VideoInOptions", "VideoInDayNight"] = "VideoInOptions"
     config_narrowing: bool = True  # a narrowed table name works; otherwise it gives an empty answer
     heartbeat: bool = True
+    onvif: bool = True  # it has the ONVIF services too
     latency_s: float = 0.3  # of each control request
     latency_spread_s: float = 0.1
+    latency_tail: float = 0.02  # of the requests take two to three times as long
+    status_lag_s: float | None = None  # how old the pose in a status is; None: one latency
     snapshot_s: float = 0.5  # of each snapshot
     boot_s: float = 60.0
     pan_speeds: tuple[float, ...] = (1.0, 3.0, 6.0, 10.0, 16.0, 24.0, 34.0, 45.0)  # degrees/s at speeds 1 to 8
     tilt_share: float = 0.6  # of the pan speed
+    pan_acceleration: float = 120.0  # degrees/s^2, and as much when slowing down; all of these are inferred
+    tilt_acceleration: float = 90.0
     zoom_speed: float = 4.0  # of its 8 levels, per second
+    zoom_acceleration: float = 40.0
     preset_max: int = 25
-
-    def speed(self, level: int) -> float:
-        """Degrees per second of pan; a level out of range counts as the nearest."""
-        return self.pan_speeds[min(max(level, 1), len(self.pan_speeds)) - 1]
 
 
 PROFILES: dict[str, Profile] = {

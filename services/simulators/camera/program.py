@@ -15,6 +15,8 @@ from services.simulators.camera import rtsp
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door
 from services.simulators.camera.http import CameraServer
+from services.simulators.camera.latency import Latency
+from services.simulators.camera.onvif.service import Onvif
 from services.simulators.camera.profiles import PROFILES
 from services.simulators.camera.settings import Config
 from services.simulators.camera.side_door import SideDoor
@@ -80,7 +82,7 @@ def inside(config: Config, now: float) -> Inside:
     if config.camera not in world.cameras:
         raise ConfigError([f"camera: expected one of {', '.join(world.cameras)}, got {config.camera!r}"])
     camera, profile = world.cameras[config.camera], PROFILES[config.profile]
-    device = Device(camera, profile, now)
+    device = Device(camera, profile, now, Latency(profile, config.latency_s, Random(config.seed)))
     realm, password = f"Login to {camera.serial}", config.password.get_secret_value()
     door = Door(realm, config.user, password, profile, Random(config.seed))
     pictures = Pictures(Scene(world, camera.lens, config.seed), camera, device.tables, device.motion, config.seed)
@@ -90,8 +92,8 @@ def inside(config: Config, now: float) -> Inside:
 def _server(config: Config, clock: Callable[[], float]) -> CameraServer:
     behind = inside(config, clock())
     server = CameraServer((config.host, config.port), behind.device, behind.door, behind.pictures, clock)
-    if config.latency_s is not None:
-        server.latency_s = config.latency_s
+    if behind.device.profile.onvif:
+        server.onvif = Onvif(behind.device, config.user, config.password.get_secret_value())
     return server
 
 

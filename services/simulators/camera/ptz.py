@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import isfinite
 
 from services.simulators.camera.config_tables import Tables
+from services.simulators.camera.latency import Latency
 from services.simulators.camera.messages import OK, Answer, Request, lines, refusal
 from services.simulators.camera.motors import CODES, Motors, Pose, reading
 from services.simulators.camera.profiles import Profile
@@ -16,13 +17,14 @@ IDLE_CODES = ("FocusNear", "FocusFar", "IrisLarge", "IrisSmall")  # accepted; a 
 class Ptz:
     """The motors, the presets, and what `ptz.cgi` does with them."""
 
-    def __init__(self, camera: WorldCamera, profile: Profile, tables: Tables, now: float) -> None:
-        self._camera, self._profile, self._tables = camera, profile, tables
+    def __init__(self, camera: WorldCamera, profile: Profile, tables: Tables, latency: Latency, now: float) -> None:
+        self._camera, self._profile, self._tables, self._latency = camera, profile, tables, latency
         self.motors = Motors(camera, profile, now)
         self.presets = {
             place.preset: (name, Pose(*camera.aim(place.looks_at), 0.0)) for name, place in camera.places.items()
         }
         self._preset = 0  # the last one gone to
+        self.commands = 0  # that were to move something
         self._actions = {
             "start": self._start,
             "stop": self._stop,
@@ -45,6 +47,7 @@ class Ptz:
             channel = int(request.number("channel", self._profile.ptz_channels[0]))
             if act is None or channel not in self._profile.ptz_channels:
                 return refusal(self._profile)
+            self.commands += not request.action.startswith("get")
             return act(request, now)
         except ValueError:
             return refusal(self._profile)
@@ -105,12 +108,15 @@ class Ptz:
         goal = Pose((180.0 - request.number("arg1")) % 360.0, request.number("arg2"), request.number("arg3"))
         if not all(isfinite(value) for value in goal):
             return refusal(self._profile)
-        self.motors.go(goal if self._profile.position_abs == "full" else Pose(goal.pan, here.tilt, goal.zoom), now)
+        goal = goal if self._profile.position_abs == "full" else goal._replace(tilt=here.tilt)
+        self.motors.go(goal, now, "PositionABS")
         return OK
 
     def _status(self, request: Request, now: float) -> Answer:
-        pan, tilt, zoom = reading(self.motors.pose(now))
-        moves, zooms = self._moving(now)
+        """All of it is of one lag ago, the position and whether it moves."""
+        seen = now - self._latency.lag_s
+        pan, tilt, zoom = reading(self.motors.pose(seen))
+        moves, zooms = self._moving(seen)
         key, form = self._profile.position_key, self._profile.status_form
         at = [f"{key}[0]={pan:.6f}", f"{key}[1]={tilt:.6f}", f"{key}[2]={zoom:.6f}"]
         if form == "c":
@@ -123,8 +129,8 @@ class Ptz:
         tail += ["ZoomValue=170"] if form == "b" else []
         return lines(f"status.{line}" for line in (*head, f"MoveStatus={moves}", "PTS=0", *at, *tail))
 
-    def _moving(self, now: float) -> tuple[str, str]:
-        rates = self.motors.rates(now)
+    def _moving(self, seen: float) -> tuple[str, str]:
+        rates = self.motors.rates(seen)
         return "Moving" if rates.pan or rates.tilt else "Idle", "Zooming" if rates.zoom else "Idle"
 
     def _presets(self, request: Request, now: float) -> Answer:

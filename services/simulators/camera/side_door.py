@@ -1,6 +1,7 @@
 """The tests' way in, on a port of its own: JSON to see and to change what no real camera would tell.
 
 GET  /state                              true pose, reading, motion, the door's counters, frames rendered and their rate
+GET  /motors                             what they can (position, speeds, accelerations) and what they did (counters)
 GET  /log                                requests: time, method, target, status, authorized
 POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand there at once
 POST /event    {"code", "action", "index"}
@@ -14,11 +15,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import asdict
 from http.server import BaseHTTPRequestHandler
 from typing import Any
 
 from services.simulators.camera.http import CameraServer, Port
-from services.simulators.camera.motors import reading
+from services.simulators.camera.motors import Axes, reading
 
 Order = Callable[[CameraServer, dict[str, Any]], object]
 
@@ -36,6 +38,15 @@ def state(camera: CameraServer) -> dict[str, Any]:
         "door": camera.door.counters,
         **camera.pictures.rates(),
     }
+
+
+def motors(camera: CameraServer) -> dict[str, Any]:
+    """The constants of each axis (pan as travel: reading = (180 - travel) mod 360), and what has been done so far."""
+    ptz = camera.device.ptz
+    worked = ptz.motors.worked(camera.clock())
+    axes = {name: asdict(rail) for name, rail in zip(Axes._fields, ptz.motors.rails, strict=True)}
+    done = {"travelled": worked.travelled._asdict(), "pushed_s": worked.pushed_s._asdict()}
+    return {"axes": axes, **done, "motions": worked.motions, "commands": ptz.commands}
 
 
 def _pose(camera: CameraServer, order: dict[str, Any]) -> None:
@@ -57,10 +68,11 @@ def _freeze(camera: CameraServer, order: dict[str, Any]) -> None:
 
 
 def _latency(camera: CameraServer, order: dict[str, Any]) -> None:
-    camera.latency_s = float(order["seconds"])
+    camera.device.latency.seconds = float(order["seconds"])
 
 
-VIEWS: dict[str, Callable[[CameraServer], object]] = {"/state": state, "/log": lambda camera: list(camera.log)}
+VIEWS: dict[str, Callable[[CameraServer], object]] = {"/state": state, "/motors": motors}
+VIEWS["/log"] = lambda camera: list(camera.log)
 ORDERS: dict[str, Order] = {
     "/pose": _pose,
     "/event": _event,

@@ -83,8 +83,8 @@ def test_a_move_is_seen_in_status_and_truth(client: httpx.Client, door: httpx.Cl
     wait_until(lambda: door.get("/state").json()["pose"]["pan"] > 30, "the camera to turn", 5)
     assert "MoveStatus=Moving" in client.get(STATUS).text
     client.get("/cgi-bin/ptz.cgi?action=stop&channel=1&code=Right&arg1=0&arg2=0&arg3=0")
+    wait_until(lambda: not door.get("/state").json()["moving"], "the camera to come to rest", 5)
     still = door.get("/state").json()
-    assert not still["moving"]
     assert f"Postion[0]={still['reading']['pan']:.6f}" in client.get(STATUS).text
 
 
@@ -179,9 +179,8 @@ def test_the_side_door_refuses_nonsense(door: httpx.Client, path: str, body: obj
 
 
 def test_control_requests_wait_their_turn(config: Config) -> None:
-    slow = config.model_copy(update={"latency_s": 0.15})
+    slow = config.model_copy(update={"latency_s": 0.25})  # 0.15 at least
     with start(slow) as camera, httpx.Client(auth=httpx.DigestAuth("ros", "secret123")) as client:
-        camera.server.spread_s = 0.0
         client.get(camera.url + STATUS)
         began = camera.server.clock()
         threads = [threading.Thread(target=client.get, args=(camera.url + STATUS,)) for _ in range(3)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import httpx
 
-from services.camera.requests import Away, BadLogin, Locked, Refused
+from services.camera.requests import Away, Locked, Refused
 
 
 def read_table(body: str) -> dict[str, str]:
@@ -26,7 +26,7 @@ def check(response: httpx.Response) -> httpx.Response:
     if response.status_code == 401:
         if "Invalid Authority" in text:
             raise Refused("the account has no right to do that")
-        raise BadLogin("the camera does not accept this user and password")
+        raise Away("the camera answered 401 without a reason to doubt the password")  # its connections may be used up
     if response.status_code >= 500 and response.status_code != 501:
         raise Away(f"the camera answered {response.status_code}")
     if response.status_code != 200 or text.split()[:1] == ["Error"]:

@@ -1,0 +1,234 @@
+"""Cameras of any brand that speak ONVIF Profile S with PTZ. How SOAP is said and signed is `web/soap.py`.
+
+Directions are the picture's (x to the right, y up). Positions are degrees where the camera has a space in degrees. The
+generic space (-1 to 1) is the whole travel: on pan from one side of `pan_dead_arc` to the other, growing to the right
+as the reading does; on tilt from the top (1, the least reading) to the bottom of `tilt_range`; zoom 0 to 1 is
+`zoom_range`. Number n of our presets is the one that is named `apartment-n`, or else the camera's token n.
+ONVIF does not tell how the picture is flipped, so there the configuration counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, nan
+from urllib.parse import urlsplit
+from xml.etree.ElementTree import Element
+from xml.sax.saxutils import escape
+
+import httpx
+
+from services.camera import requests
+from services.camera.address import Address
+from services.camera.requests import Away, Camera, Identity, Reading, Refused, Start
+from services.camera.web.connection import SNAPSHOT, connection, fetch
+from services.camera.web.digest import Login
+from services.camera.web.gate import Gate
+from services.camera.web.soap import DEVICE, FIRST, SCHEMA, Soap
+
+MEDIA = "http://www.onvif.org/ver10/media/wsdl"
+PTZ = "http://www.onvif.org/ver20/ptz/wsdl"
+ITSELF_S = 30  # a motion whose stop is lost ends by itself after this: longer than the longest way at a middling speed
+Bounds = tuple[float, float]
+GENERIC: Bounds = (-1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What the camera calls its picture and motors together, and the bounds of its position spaces."""
+
+    token: str
+    pan: Bounds
+    tilt: Bounds
+    zoom: Bounds
+
+    @property
+    def in_degrees(self) -> bool:
+        """Whether the space is wider than the generic one."""
+        return self.pan[1] - self.pan[0] > GENERIC[1] - GENERIC[0] + 0.1
+
+
+class Onvif:
+    """A Camera; where its services are, and its profile, are asked for once."""
+
+    def __init__(
+        self, address: Address, gate: Gate, transport: httpx.BaseTransport | None = None, *, urgent: bool = False
+    ) -> None:
+        self.address = address
+        self.http = connection(address, Login(address.user, address.password, gate, urgent=urgent), transport)
+        self.soap = Soap(self.http, address, gate, urgent=urgent)
+        self._paths: dict[str, str] = {DEVICE: FIRST}
+        self._profile: Profile | None = None
+
+    def close(self) -> None:
+        """Ends the connection."""
+        self.http.close()
+
+    def send(self, request: requests.Request) -> object:
+        """One request of ours, mostly one of the camera's; DeviceError as in `requests.py`."""
+        match request:
+            case Start():
+                return self._command("ContinuousMove", f"{velocity(request)}<Timeout>PT{ITSELF_S}S</Timeout>")
+            case requests.Stop():
+                return self._command("Stop", "<PanTilt>true</PanTilt><Zoom>true</Zoom>")
+            case requests.Status():
+                return read_reading(self._ptz("GetStatus"), self._known_profile(), self.address)
+            case requests.GotoPreset(number):
+                return self._command("GotoPreset", _token("PresetToken", self._preset(number)))
+            case requests.SavePreset(number):
+                return self._save(number)
+            case requests.ClearPreset(number):
+                return self._clear(number)
+            case requests.Snapshot():
+                return self._snapshot()
+            case requests.Identify():
+                return self._identify()
+            case requests.Reboot():
+                self._ask(DEVICE, "SystemReboot")
+                return None
+            case _:
+                raise Refused(f"ONVIF has no {type(request).__name__}")
+
+    def _ask(self, service: str, action: str, inner: str = "") -> Element:
+        return self.soap.call(self._path(service), service, action, inner)
+
+    def _path(self, service: str) -> str:
+        """Where a service is; not on the host that the camera believes to have, which may be hidden by a router."""
+        if service not in self._paths:
+            told = self._ask(DEVICE, "GetServices", "<IncludeCapability>false</IncludeCapability>")
+            for one in told.iterfind(f"{{{DEVICE}}}Service"):
+                where = _local(one.findtext(f"{{{DEVICE}}}XAddr") or "")
+                self._paths.setdefault(one.findtext(f"{{{DEVICE}}}Namespace") or "", where)
+        if service not in self._paths:
+            raise Refused(f"the camera does not offer {service}")
+        return self._paths[service]
+
+    def _known_profile(self) -> Profile:
+        """The first profile with motors."""
+        if self._profile is None:
+            told = self._ask(MEDIA, "GetProfiles").iterfind(f"{{{MEDIA}}}Profiles")
+            mine = next((one for one in told if one.find(f"{SCHEMA}PTZConfiguration") is not None), None)
+            if mine is None:
+                raise Refused("the camera has no ONVIF profile with motors")
+            node = mine.findtext(f"{SCHEMA}PTZConfiguration/{SCHEMA}NodeToken") or ""
+            self._profile = read_profile(mine.get("token", ""), self._ask(PTZ, "GetNode", _token("NodeToken", node)))
+        return self._profile
+
+    def _ptz(self, action: str, inner: str = "") -> Element:
+        return self._ask(PTZ, action, _token("ProfileToken", self._known_profile().token) + inner)
+
+    def _command(self, action: str, inner: str) -> object:
+        self._ptz(action, inner)
+        return None
+
+    def _preset(self, number: int) -> str:
+        """The camera's token for a number of ours; Refused when nothing is kept there."""
+        told = self._ptz("GetPresets").iterfind(f"{{{PTZ}}}Preset")
+        kept = {one.get("token", ""): one.findtext(f"{SCHEMA}Name") for one in told}
+        ours = [token for token, name in kept.items() if name == f"apartment-{number}"]
+        if ours or str(number) in kept:
+            return ours[0] if ours else str(number)
+        raise Refused(f"the camera has no preset {number}")
+
+    def _save(self, number: int) -> object:
+        try:
+            known = _token("PresetToken", self._preset(number))
+        except Refused:
+            known = ""  # then the camera chooses the token
+        return self._command("SetPreset", f"<PresetName>apartment-{number}</PresetName>{known}")
+
+    def _clear(self, number: int) -> object:
+        try:
+            known = self._preset(number)
+        except Refused:
+            return None
+        return self._command("RemovePreset", _token("PresetToken", known))
+
+    def _snapshot(self) -> bytes:
+        told = self._ask(MEDIA, "GetSnapshotUri", _token("ProfileToken", self._known_profile().token))
+        answer = fetch(self.http, _local(told.findtext(f".//{SCHEMA}Uri") or ""), SNAPSHOT)
+        if answer.status_code == 401:
+            raise Away("the camera answered 401 without a reason to doubt the password")
+        if not answer.content.startswith(b"\xff\xd8"):
+            raise Away(f"expected a JPEG, got {answer.status_code} {answer.content[:40]!r}")
+        return answer.content
+
+    def _identify(self) -> Identity:
+        told = self._ask(DEVICE, "GetDeviceInformation")
+        keys = ("Model", "SerialNumber", "FirmwareVersion")
+        return Identity(*(told.findtext(f"{{{DEVICE}}}{key}") or "" for key in keys))
+
+
+def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:
+    """A client for the camera there; nothing is sent yet. `urgent`: it is the one that moves the motors."""
+    return Onvif(address, gate, urgent=urgent)
+
+
+def velocity(request: Start) -> str:
+    """The speeds of a motion, 1 to 8, as eighths of the top speed."""
+    right, down, zoom = request.direction.value
+    if zoom:
+        return f'<Velocity><Zoom xmlns="{SCHEMA[1:-1]}" x="{zoom}"/></Velocity>'
+    pan_speed = min(8, max(1, request.speed)) / 8
+    tilt_speed = min(8, max(1, request.tilt_speed or request.speed)) / 8 if right else pan_speed
+    return f'<Velocity><PanTilt xmlns="{SCHEMA[1:-1]}" x="{right * pan_speed}" y="{-down * tilt_speed}"/></Velocity>'
+
+
+def read_profile(token: str, node: Element) -> Profile:
+    """A profile with the bounds that its motors' node tells."""
+    pan = _bounds(node, "AbsolutePanTiltPositionSpace", "XRange", GENERIC)
+    tilt = _bounds(node, "AbsolutePanTiltPositionSpace", "YRange", GENERIC)
+    return Profile(token, pan, tilt, _bounds(node, "AbsoluteZoomPositionSpace", "XRange", (0.0, 1.0)))
+
+
+def read_reading(told: Element, profile: Profile, address: Address) -> Reading:
+    """Degrees as the camera reads them, by the convention above; Away when the camera tells no position."""
+    found, zoomed = (told.find(f".//{SCHEMA}Position/{SCHEMA}{part}") for part in ("PanTilt", "Zoom"))
+    if found is None:
+        raise Away("expected a position in the camera's status, got none")
+    x, y, z = _number(found, "x"), _number(found, "y"), 0.0 if zoomed is None else _number(zoomed, "x")
+    if profile.in_degrees:
+        pan, tilt = x, -y
+    else:
+        (low, high), (dead, after) = address.tilt_range, address.pan_dead_arc
+        pan = after + _share(x, profile.pan) * (360.0 - (after - dead))
+        tilt = high - _share(y, profile.tilt) * (high - low)
+    wide, close = address.zoom_range
+    words = {node.text for node in told.iterfind(f".//{SCHEMA}MoveStatus/*")}
+    moving = True if "MOVING" in words else False if "IDLE" in words else None
+    return Reading(
+        round(pan, 2) % 360.0, round(tilt, 2), round(wide + _share(z, profile.zoom) * (close - wide), 2), moving
+    )
+
+
+def _share(value: float, bounds: Bounds) -> float:
+    return (value - bounds[0]) / (bounds[1] - bounds[0])
+
+
+def _token(tag: str, text: str) -> str:
+    return f"<{tag}>{escape(text)}</{tag}>"
+
+
+def _local(uri: str) -> str:
+    """Path and query of an address."""
+    parts = urlsplit(uri)
+    return f"{parts.path}?{parts.query}" if parts.query else parts.path
+
+
+def _number(node: Element, key: str) -> float:
+    try:
+        number = float(node.get(key, ""))
+    except ValueError:
+        number = nan
+    if not isfinite(number):
+        raise Away(f"expected a number from the camera, got {node.get(key)!r}")
+    return number
+
+
+def _bounds(node: Element, space: str, axis: str, otherwise: Bounds) -> Bounds:
+    """The bounds of the first such space; `otherwise` when they are not told or make no sense."""
+    ends = [node.findtext(f".//{SCHEMA}{space}/{SCHEMA}{axis}/{SCHEMA}{end}") for end in ("Min", "Max")]
+    try:
+        low, high = (float(end or "") for end in ends)
+    except ValueError:
+        return otherwise
+    return (low, high) if low < high else otherwise

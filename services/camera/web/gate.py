@@ -1,0 +1,162 @@
+"""One camera's login gate: how often a password may be tried, over all connections to that camera together.
+
+Everything that logs in there (control, pictures, events, sound, video) asks the same Gate before it sends credentials
+and tells it what came of them. Three logins that fail in a row are the most there will be: then nobody tries for a
+while that doubles each time, and a single failure after that while closes it again. A camera locks an account after
+about five, and a valid login can meet an odd refusal, so one alone proves nothing. Not here: how credentials are
+computed (`digest.py`). The watchdog is a process of its own and has a gate of its own.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from services.camera.requests import Away, BadLogin, Locked
+
+MOST_FAILURES = 3
+RETRY_S, LONGEST_RETRY_S = 120.0, 1800.0  # a lock lasts about 30 minutes
+ODD_S = 0.5  # an odd refusal of a valid login is over after so long
+PATIENCE_S = 30.0  # who waits longer for the outcome of other logins gives up
+
+
+@dataclass
+class Book:
+    """What the gate knows, without clock and threads; times are seconds of any one clock."""
+
+    retry_s: float = RETRY_S
+    failures: int = 0  # in a row
+    ever: int = 0  # failures since the beginning
+    flying: int = 0  # logins whose outcome is not known yet
+    others: int = 0  # of these, the ones that are not urgent
+    closings: int = 0  # in a row
+    locked: bool = False
+    opens_at: float | None = None  # None: it is open
+    closed_s: float = 0.0  # how long it was closed the last time
+
+    @property
+    def most(self) -> int:
+        """How many logins may fail in a row; one when it has been closed before."""
+        return 1 if self.closings else MOST_FAILURES
+
+    def closed(self, now: float) -> BadLogin | None:
+        """Why nobody may try at this time; None: it is open."""
+        if self.opens_at is None or now >= self.opens_at:
+            return None
+        wait = f"nobody tries again for {self.closed_s:.0f} s"
+        if self.locked:
+            return Locked(f"the camera has locked this account after wrong passwords; {wait}", self.opens_at - now)
+        return BadLogin(f"the camera does not accept this user and password; {wait}", self.opens_at - now)
+
+    def may_try(self, *, urgent: bool) -> bool:
+        """Whether one more login can be afforded whatever becomes of those that are on their way.
+
+        What is urgent waits only for the last of the tries; the rest goes one by one, and alone after a failure.
+        """
+        if self.failures + self.flying >= self.most:
+            return self.flying == 0
+        return urgent or (self.others == 0 and (self.failures == 0 or self.flying == 0))
+
+    def tries(self, *, urgent: bool) -> int:
+        """One more is on its way; the number is for `passed`."""
+        if self.failures >= self.most:
+            self.failures = 0
+        self.flying += 1
+        self.others += not urgent
+        return self.ever
+
+    def back(self, *, urgent: bool) -> None:
+        """It is not on its way any more."""
+        self.flying -= 1
+        self.others -= not urgent
+
+    def passed(self, number: int) -> None:
+        """A login was accepted; it says nothing about those that failed after it was sent."""
+        if number == self.ever:
+            self.failures, self.closings, self.locked, self.opens_at = 0, 0, False, None
+
+    def failed(self, now: float, *, sure: bool) -> None:
+        """A login was refused; `sure`: it was a repeat with a new challenge, some time after the first."""
+        self.failures += 1
+        self.ever += 1
+        if sure or self.failures >= self.most:
+            self.close(now, locked=False)
+
+    def close(self, now: float, *, locked: bool) -> None:
+        """Nobody tries for a while."""
+        if self.closed(now) is None:
+            self.closed_s = min(LONGEST_RETRY_S, self.retry_s * 2**self.closings)
+            self.opens_at = now + self.closed_s
+            self.closings += 1
+            self.failures = self.most
+        self.locked = self.locked or locked
+
+
+class Try:
+    """One login that is on its way: tell what became of it before the context ends; nothing when no answer came."""
+
+    def __init__(self, gate: Gate, number: int) -> None:
+        self._gate, self._number = gate, number
+
+    def passed(self) -> None:
+        """The camera knows us (it may refuse what was asked, for want of rights)."""
+        with self._gate.changed:
+            self._gate.book.passed(self._number)
+
+    def failed(self, *, sure: bool = False) -> None:
+        """The camera does not; `sure` when this was a repeat after ODD_S with a new challenge."""
+        with self._gate.changed:
+            self._gate.book.failed(self._gate.clock(), sure=sure)
+
+
+class Gate:
+    """The book for several threads. `pause` waits out an odd refusal."""
+
+    def __init__(
+        self,
+        retry_s: float = RETRY_S,
+        clock: Callable[[], float] = time.monotonic,
+        pause: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.book = Book(retry_s)
+        self.clock = clock
+        self.pause = pause
+        self.changed = threading.Condition()
+
+    def check(self) -> None:
+        """BadLogin or Locked when nobody may try now."""
+        with self.changed:
+            if (why := self.book.closed(self.clock())) is not None:
+                raise why
+
+    def locked(self) -> Locked:
+        """The camera said that the account is locked; the error to raise."""
+        with self.changed:
+            self.book.close(self.clock(), locked=True)
+            why = self.book.closed(self.clock())
+        return why if isinstance(why, Locked) else Locked("the camera has locked this account after wrong passwords")
+
+    @contextmanager
+    def login(self, *, urgent: bool = False) -> Iterator[Try]:
+        """Around each request that carries credentials, until its first answer. Waits while that may be one too many.
+
+        BadLogin or Locked when nobody may try now, Away when the others take too long. `urgent` is for control.
+        """
+        with self.changed:
+            if not self.changed.wait_for(lambda: self._open(urgent), PATIENCE_S):
+                raise Away("other logins to this camera have no answer yet")
+            number = self.book.tries(urgent=urgent)
+        try:
+            yield Try(self, number)
+        finally:
+            with self.changed:
+                self.book.back(urgent=urgent)
+                self.changed.notify_all()
+
+    def _open(self, urgent: bool) -> bool:
+        if (why := self.book.closed(self.clock())) is not None:
+            raise why
+        return self.book.may_try(urgent=urgent)

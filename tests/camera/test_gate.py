@@ -1,0 +1,218 @@
+"""The login gate: how many logins may fail, over all connections of a camera together."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import httpx
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import SecretStr
+
+from services.camera.requests import BadLogin, Locked
+from services.camera.web.digest import Login
+from services.camera.web.gate import LONGEST_RETRY_S, RETRY_S, Book, Gate
+from services.errors import DeviceError
+
+WAIT_S = 10.0
+PIECES = ("control", "pictures", "events", "sound")
+
+
+class Camera:
+    """Digest, a new nonce with each 401; counts logins that were refused. `odd` of the next requests meet a 401."""
+
+    def __init__(self, password: str = "right") -> None:
+        self.password, self.odd, self.lock, self.stale = password, 0, False, False
+        self.nonces: dict[str, int] = {}
+        self.failed = self.bare = self.served = 0
+        self.door = threading.Lock()
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        with self.door:
+            return self.judge(request)
+
+    def judge(self, request: httpx.Request) -> httpx.Response:
+        header = request.headers.get("authorization", "")
+        if self.lock:
+            self.failed += bool(header)
+            return httpx.Response(401, text="Error\r\nUser Locked!\r\n")
+        if not header:
+            self.bare += 1
+            return self.challenge()
+        if self.odd:
+            self.odd -= 1
+            return self.challenge()
+        if not self.knows(header, request.url.raw_path.decode()):
+            self.failed += 1
+            return self.challenge()
+        self.served += 1
+        return httpx.Response(200, text="OK\r\n")
+
+    def challenge(self) -> httpx.Response:
+        nonce = str(len(self.nonces) + 1)
+        self.nonces[nonce] = 0
+        stale = ',stale="true"' if self.stale else ""
+        return httpx.Response(401, headers={"WWW-Authenticate": f'Digest realm="A",qop="auth",nonce="{nonce}"{stale}'})
+
+    def knows(self, header: str, uri: str) -> bool:
+        said = {key: value.strip('"') for key, _, value in (part.partition("=") for part in header[7:].split(", "))}
+
+        def digest(text: str) -> str:
+            return hashlib.md5(text.encode()).hexdigest()
+
+        first, second = digest(f"ros:A:{self.password}"), digest(f"GET:{uri}")
+        middle = f"{said['nonce']}:{said['nc']}:{said['cnonce']}:auth"
+        return said["nonce"] in self.nonces and said["response"] == digest(f"{first}:{middle}:{second}")
+
+
+class Visitors:
+    """Several connections to one camera through one gate; time stands still unless it is moved."""
+
+    def __init__(self, camera: Camera) -> None:
+        self.now = 0.0
+        self.pauses: list[float] = []
+        self.gate = Gate(clock=lambda: self.now, pause=self.pauses.append)
+        self.clients = {
+            name: httpx.Client(
+                base_url="http://192.0.2.9",
+                auth=Login("ros", SecretStr("right"), self.gate, urgent=name == "control"),
+                transport=httpx.MockTransport(camera),
+            )
+            for name in PIECES
+        }
+
+    def get(self, name: str = "control") -> int:
+        return self.clients[name].get("/cgi-bin/x.cgi").status_code
+
+    def outcome(self, name: str) -> type[DeviceError] | int:
+        try:
+            return self.get(name)
+        except DeviceError as error:
+            return type(error)
+
+    def all_together(self) -> list[type[DeviceError] | int]:
+        with ThreadPoolExecutor(len(PIECES)) as threads:
+            return list(threads.map(self.outcome, PIECES, timeout=WAIT_S))
+
+
+@pytest.mark.parametrize("turn", range(10))
+def test_after_a_password_change_at_most_three_logins_fail_over_all_connections_together(turn: int) -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    assert [visitors.get(name) for name in PIECES] == [200] * 4
+    camera.password = "changed"
+    assert visitors.all_together() == [BadLogin] * 4
+    assert camera.failed <= 3
+    asked = camera.failed + camera.bare
+    assert [visitors.outcome(name) for name in PIECES * 3] == [BadLogin] * 12
+    assert camera.failed + camera.bare == asked
+
+
+def test_a_password_that_was_never_right_is_sent_twice() -> None:
+    camera = Camera("another")
+    visitors = Visitors(camera)
+    assert visitors.outcome("control") is BadLogin
+    assert (camera.bare, camera.failed, visitors.pauses) == (1, 2, [0.5])
+
+
+@pytest.mark.parametrize("odd", [1, 2])
+def test_an_odd_refusal_or_two_are_not_taken_for_a_wrong_password(odd: int) -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    visitors.get()
+    camera.odd = odd
+    assert visitors.get() == 200
+    assert visitors.gate.book.failures == 0
+    assert visitors.pauses == [0.5] * (odd - 1)
+
+
+def test_a_camera_that_forgot_its_nonces_is_no_wrong_password_however_many_connections_had_one() -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    for _ in range(5):
+        assert [visitors.get(name) for name in PIECES] == [200] * 4
+        camera.nonces = {f"x{number}": 0 for number in camera.nonces}
+        assert visitors.all_together() == [200] * 4
+
+
+def test_stale_for_ever_is_given_up_without_a_verdict_on_the_password() -> None:
+    camera = Camera()
+    camera.stale, camera.odd = True, 99
+    visitors = Visitors(camera)
+    assert visitors.get() == 401
+    assert visitors.gate.book.failures == 0
+
+
+def test_a_closed_gate_opens_after_a_growing_delay_for_one_login_only() -> None:
+    camera = Camera("another")
+    visitors = Visitors(camera)
+    visitors.outcome("control")
+    for delay in (RETRY_S, 2 * RETRY_S, 4 * RETRY_S):
+        failed = camera.failed
+        visitors.now += delay - 1
+        assert [visitors.outcome(name) for name in PIECES] == [BadLogin] * 4
+        assert camera.failed == failed
+        visitors.now += 2
+        assert [visitors.outcome(name) for name in PIECES] == [BadLogin] * 4
+        assert camera.failed == failed + 1
+
+
+def test_when_the_password_is_right_again_everybody_comes_in_at_the_next_opening() -> None:
+    camera = Camera("another")
+    visitors = Visitors(camera)
+    visitors.outcome("control")
+    camera.password = "right"
+    visitors.now += RETRY_S + 1
+    assert [visitors.get(name) for name in PIECES] == [200] * 4
+
+
+def test_a_locked_account_is_told_and_later_asked_without_a_password() -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    visitors.get()
+    camera.lock = True
+    assert visitors.outcome("control") is Locked
+    assert visitors.outcome("events") is Locked
+    failed = camera.failed
+    visitors.now += RETRY_S + 1
+    assert visitors.outcome("control") is Locked
+    assert camera.failed == failed
+    camera.lock = False
+    visitors.now += 2 * RETRY_S + 1
+    assert visitors.get() == 200
+
+
+def test_the_pause_never_exceeds_the_longest() -> None:
+    book, now = Book(), 0.0
+    for _ in range(20):
+        book.close(now, locked=False)
+        assert book.opens_at is not None
+        assert book.opens_at - now <= LONGEST_RETRY_S
+        now = book.opens_at
+
+
+@given(st.lists(st.tuples(st.booleans(), st.integers(0, 3)), max_size=60))
+def test_whatever_the_order_of_tries_and_answers_no_more_than_three_fail(steps: list[tuple[bool, int]]) -> None:
+    """A pair says whether a try is urgent, and how many outstanding ones are refused after it began."""
+    book, flying, failed = Book(), list[bool](), 0
+    for urgent, answers in steps:
+        if book.closed(0.0) is None and book.may_try(urgent=urgent):
+            book.tries(urgent=urgent)
+            flying.append(urgent)
+        for _ in range(min(answers, len(flying))):
+            book.failed(0.0, sure=False)
+            book.back(urgent=flying.pop())
+            failed += 1
+    assert failed + len(flying) <= 3
+
+
+def test_an_answer_from_before_a_refusal_does_not_open_the_way_for_more() -> None:
+    book = Book()
+    early = book.tries(urgent=False)
+    late = book.tries(urgent=True)
+    book.failed(0.0, sure=False)
+    book.passed(early)
+    assert (early, late, book.failures) == (0, 0, 1)

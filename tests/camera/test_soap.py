@@ -1,0 +1,147 @@
+"""ONVIF's messages: the signature byte for byte, faults as errors, clocks that are off, and positions in each space."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from datetime import UTC, datetime
+from xml.etree import ElementTree
+
+import httpx
+import pytest
+from pydantic import SecretStr
+
+from services.camera.address import Address
+from services.camera.brands.onvif import Onvif, Profile, read_reading
+from services.camera.requests import Away, BadLogin, Locked, Refused, Status
+from services.camera.web.gate import Gate
+from services.camera.web.soap import FIRST, Soap, envelope, read_envelope, token
+
+ADDRESS = Address("http://192.0.2.10", "admin", SecretStr("secret123"))
+NOW = 1_768_000_000.0
+
+
+def fault(*codes: str) -> bytes:
+    values = "".join(f"<e:Value>{code}</e:Value>" for code in codes)
+    reason = '<e:Reason><e:Text xml:lang="en">as it says</e:Text></e:Reason>'
+    return envelope(
+        "", f'<e:Fault xmlns:e="http://www.w3.org/2003/05/soap-envelope"><e:Code>{values}</e:Code>{reason}</e:Fault>'
+    )
+
+
+def clock(hour: int) -> bytes:
+    return envelope("", (
+        '<a xmlns="http://www.onvif.org/ver10/schema"><UTCDateTime><Time><Hour>'
+        f"{hour}</Hour><Minute>0</Minute><Second>60</Second></Time><Date><Year>2026</Year><Month>1</Month><Day>9</Day>"
+        "</Date></UTCDateTime></a>"
+    ))  # fmt: skip
+
+
+def test_the_digest_is_that_of_the_onvif_programmers_guide() -> None:
+    at = datetime(2010, 9, 16, 7, 50, 45, tzinfo=UTC).timestamp()
+    text = token("user", "userpassword", at, base64.b64decode("LKqI6G/AikKCQrN0zqZFlg=="))
+    assert ">2010-09-16T07:50:45Z<" in text
+    assert ">tuOSpGlFlIXsozq4HFNeeGeFLEI=<" in text
+
+
+@pytest.mark.parametrize(
+    ("codes", "kind"),
+    [
+        (("s:Sender", "ter:NotAuthorized"), BadLogin),
+        (("s:Sender", "wsse:FailedAuthentication"), BadLogin),
+        (("s:Sender", "ter:AccountLocked"), Locked),
+        (("s:Sender", "ter:InvalidArgVal", "ter:NoToken"), Refused),
+        (("s:Receiver", "ter:ActionNotSupported"), Refused),
+        (("s:Receiver", "ter:Action", "ter:MovingPTZ"), Refused),
+        (("s:Receiver",), Away),
+    ],
+)
+def test_a_fault_is_the_error_that_says_what_to_do(codes: tuple[str, ...], kind: type[Exception]) -> None:
+    with pytest.raises(kind) as raised:
+        read_envelope(400, fault(*codes))
+    assert isinstance(raised.value, kind)
+
+
+class Device:
+    """Answers in turn; remembers when each signature says that it was made."""
+
+    def __init__(self, *answers: bytes) -> None:
+        self.answers, self.created = list(answers), list[str]()
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        _, found, rest = request.content.decode().partition('utility-1.0.xsd">')
+        self.created.append(rest[:16] if found else "unsigned")
+        return httpx.Response(200, content=self.answers.pop(0))
+
+
+def soap(device: Callable[[httpx.Request], httpx.Response]) -> Soap:
+    http = httpx.Client(base_url=ADDRESS.url, transport=httpx.MockTransport(device))
+    return Soap(http, ADDRESS, Gate(pause=lambda seconds: None), lambda: NOW)
+
+
+def test_a_login_holds_the_time_of_the_cameras_own_clock() -> None:
+    device = Device(clock(3), envelope("", "<done/>"), envelope("", "<done/>"))
+    calls = soap(device)
+    assert calls.call(FIRST, "x", "Do").tag == "done"
+    calls.call(FIRST, "x", "Do")
+    assert device.created == ["unsigned", "2026-01-09T03:00", "2026-01-09T03:00"]
+
+
+def test_a_camera_whose_clock_was_set_is_asked_for_the_time_again() -> None:
+    device = Device(clock(3), fault("ter:NotAuthorized"), clock(7), envelope("", "<done/>"))
+    assert soap(device).call(FIRST, "x", "Do").tag == "done"
+    assert device.created == ["unsigned", "2026-01-09T03:00", "unsigned", "2026-01-09T07:00"]
+
+
+def test_a_wrong_password_is_tried_twice_and_no_more() -> None:
+    refused = fault("ter:NotAuthorized")
+    device = Device(clock(3), refused, clock(3), refused)
+    calls = soap(device)
+    for _ in range(3):
+        with pytest.raises(BadLogin):
+            calls.call(FIRST, "x", "Do")
+    assert device.answers == []
+
+
+def test_an_account_without_the_right_is_told_from_a_wrong_password() -> None:
+    refused, done = fault("ter:NotAuthorized"), envelope("", "<done/>")
+    device = Device(clock(3), done, refused, clock(3), refused, done, done)
+    calls = soap(device)
+    calls.call(FIRST, "x", "Do")
+    with pytest.raises(Refused, match="no right"):
+        calls.call(FIRST, "x", "Forbidden")
+    assert calls.call(FIRST, "x", "Do").tag == "done"
+
+
+@pytest.mark.parametrize(
+    ("at", "pan", "tilt"),
+    [((-1.0, 1.0), 186.0, -10.0), ((1.0, -1.0), 179.0, 108.0), ((0.0, 0.0), 2.5, 49.0)],
+)
+def test_the_generic_space_is_the_whole_travel(at: tuple[float, float], pan: float, tilt: float) -> None:
+    found = read_reading(status(*at), Profile("p", (-1.0, 1.0), (-1.0, 1.0), (0.0, 1.0)), ADDRESS)
+    assert (found.pan, found.tilt, found.zoom, found.moving) == (pan, tilt, 4.0, True)
+
+
+def test_a_space_in_degrees_is_taken_as_it_is() -> None:
+    found = read_reading(status(-30.0, -45.0), Profile("p", (-180.0, 180.0), (-90.0, 10.0), (0.0, 1.0)), ADDRESS)
+    assert (found.pan, found.tilt) == (330.0, 45.0)
+
+
+@pytest.mark.parametrize("x", ["", "nan", "inf", "left"])
+def test_a_position_that_is_no_number_is_no_position(x: str) -> None:
+    with pytest.raises(Away):
+        read_reading(status(x, 0.0), Profile("p", (-1.0, 1.0), (-1.0, 1.0), (0.0, 1.0)), ADDRESS)
+
+
+def status(x: object, y: object) -> ElementTree.Element:
+    return ElementTree.fromstring(
+        '<a xmlns="http://www.onvif.org/ver10/schema"><Position>'
+        f'<PanTilt x="{x}" y="{y}"/><Zoom x="0.5"/></Position><MoveStatus><PanTilt>MOVING</PanTilt></MoveStatus></a>'
+    )
+
+
+def test_a_camera_without_ptz_service_says_so() -> None:
+    services = envelope("", '<GetServicesResponse xmlns="http://www.onvif.org/ver10/device/wsdl"/>')
+    camera = Onvif(ADDRESS, Gate(), httpx.MockTransport(Device(clock(3), services)))
+    with pytest.raises(Refused, match="does not offer"):
+        camera.send(Status())
