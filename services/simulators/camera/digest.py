@@ -45,15 +45,20 @@ class Door:
     """Judges Authorization headers for one account."""
 
     def __init__(self, realm: str, user: str, password: str, profile: Profile, rng: Random) -> None:
-        self.realm, self.user, self.profile = realm, user, profile
-        self.account = (user, password)  # GStreamer's own check wants it in the clear
-        self._ha1 = hashed(f"{user}:{realm}:{password}")
-        self._basic = base64.b64encode(f"{user}:{password}".encode())
+        self.realm, self.profile = realm, profile
+        self.account = ("", "")
+        self.set_account(user, password)
         self._rng = rng
         self._used: dict[str, set[str]] = {}  # nonce -> its counts that were used
         self.opaque = f"{rng.getrandbits(104):026x}"
         self.failures, self.locked_until = 0, float("-inf")
         self.counters = {"challenges": 0, "passed": 0, "wrong": 0, "stale": 0, "locked": 0}
+
+    def set_account(self, user: str, password: str) -> None:
+        """Gives the account another password; the old one does not pass any more."""
+        self.account = (user, password)
+        self._ha1 = hashed(f"{user}:{self.realm}:{password}")
+        self._basic = base64.b64encode(f"{user}:{password}".encode())
 
     def judge(self, method: str, target: str, header: str | None, now: float) -> Verdict:
         """`target` is the request target byte for byte; `header` the Authorization header."""
@@ -71,10 +76,14 @@ class Door:
             return self._refused("locked").passed
         if header is None:
             return True  # a challenge follows
-        said = fields(header)
-        asked = hashed(f"{method}:{said.get('uri', '')}")
-        right = said.get("response") == hashed(f"{self._ha1}:{said.get('nonce', '')}:{asked}")
-        return (right and said.get("username") == self.user) or self._wrong(now).passed
+        if header.lower().startswith("basic "):
+            right = header[6:].strip().encode() == self._basic
+        else:
+            said = fields(header)
+            asked = hashed(f"{method}:{said.get('uri', '')}")
+            right = said.get("response") == hashed(f"{self._ha1}:{said.get('nonce', '')}:{asked}")
+            right = right and said.get("username") == self.account[0]
+        return right or self._wrong(now).passed
 
     def forget(self) -> None:
         """Drops every nonce (a reboot)."""
@@ -94,7 +103,7 @@ class Door:
             return self._refused("challenges")
         nonce, nc = said.get("nonce", ""), said.get("nc", "")
         expected = response(self._ha1, nonce, nc, said.get("cnonce", ""), method, target)
-        if said.get("uri") != target or said.get("username") != self.user or said.get("response") != expected:
+        if said.get("uri") != target or said.get("username") != self.account[0] or said.get("response") != expected:
             return self._wrong(now)
         if not self._fresh(nonce, nc):
             return self._refused("stale", stale=True)

@@ -110,6 +110,24 @@ def test_wrong_passwords_are_refused_and_count_towards_the_lockout(camera: Simul
         _opened(_url(camera))
 
 
+def test_a_changed_password_counts_here_too(camera: Simulated) -> None:
+    camera.server.door.set_account("ros", "another")
+    with pytest.raises(av.error.HTTPUnauthorizedError):
+        _opened(_url(camera))
+    with _opened(_url(camera, account="ros:another@")) as video:
+        assert next(_frames(video)).size
+
+
+def test_old_firmware_takes_basic(config: Config) -> None:
+    with start(config.model_copy(update={"profile": "ip2m-841b-strict"})) as camera:
+        assert 'WWW-Authenticate: Basic realm="Login to AMC0000000000001"' in _asked(camera, "DESCRIBE")
+        with _opened(_url(camera)) as video:
+            assert next(_frames(video)).size
+        with pytest.raises(av.error.HTTPUnauthorizedError):
+            _opened(_url(camera, account="ros:wrong@"))
+        assert camera.server.door.counters["wrong"] == 1
+
+
 def test_an_unknown_path_is_not_found(camera: Simulated) -> None:
     with pytest.raises(av.error.HTTPNotFoundError):
         _opened(_url(camera).replace("realmonitor", "nonsense"))

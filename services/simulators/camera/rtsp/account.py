@@ -17,7 +17,8 @@ class Account(GstRtspServer.RTSPAuth):  # type: ignore[misc]
         super().__init__()
         self._camera = camera
         self._known = ("", "")
-        self.set_supported_methods(GstRtsp.RTSPAuthMethod.DIGEST)
+        only_basic = camera.device.profile.auth == "basic"
+        self.set_supported_methods(GstRtsp.RTSPAuthMethod.BASIC if only_basic else GstRtsp.RTSPAuthMethod.DIGEST)
         self.set_realm(camera.door.realm)
 
     def do_authenticate(self, context: Any) -> bool:
@@ -35,10 +36,12 @@ class Account(GstRtspServer.RTSPAuth):  # type: ignore[misc]
         if self._known == self._camera.door.account:
             return
         self.remove_digest(self._known[0])
+        self.remove_basic(GstRtspServer.RTSPAuth.make_basic(*self._known))
         self._known = self._camera.door.account
         token = GstRtspServer.RTSPToken.new()
         token.set_string("media.factory.role", ROLE)
         self.add_digest(*self._known, token)
+        self.add_basic(GstRtspServer.RTSPAuth.make_basic(*self._known), token)
 
 
 def permissions() -> Any:
