@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import httpx
 
 from services.camera.address import Address
 from services.camera.alarm.listener import Ear
-from services.camera.brands.dahua import errands, events, picture, ptz, replies, streams, system
+from services.camera.brands.dahua import errands, picture, ptz, replies, streams, system
 from services.camera.requests import (
     Away,
     Camera,
     ClearPreset,
     Direction,
     Errand,
-    Event,
     FindStream,
     GetPicture,
     GotoPreset,
     Identify,
     Identity,
+    MoveOver,
+    MoveTo,
     Picture,
     Reboot,
     Refused,
@@ -31,13 +30,13 @@ from services.camera.requests import (
     Start,
     Status,
     Stop,
+    TurnFor,
 )
+from services.camera.sound.desk import Sound
 from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch
+from services.camera.web.dahua import DahuaEar, DahuaSound
 from services.camera.web.digest import Login
-from services.camera.web.endless import Endless
 from services.camera.web.gate import Gate
-
-BEATS = 3.25  # so many heartbeats of silence are the end: three were missed, and one may be late
 
 
 class Amcrest:
@@ -55,7 +54,7 @@ class Amcrest:
         self.login = Login(address.user, address.password, gate or Gate(), urgent=urgent)
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
-        self.running: Direction | None = None
+        self.running: str | None = None  # the code of the motion that may be under way
         self._in_day_night = False  # the firmware keeps the mode in VideoInDayNight
 
     def close(self) -> None:
@@ -67,12 +66,15 @@ class Amcrest:
         match request:
             case Start():
                 return self._start(request)
+            case TurnFor() | MoveTo() | MoveOver():
+                return self._drive(request)
             case Stop():
                 return self._stop(request)
             case Status():
                 return ptz.read_status(self._status())
             case GotoPreset(number) | SavePreset(number) | ClearPreset(number):
                 code = {GotoPreset: "GotoPreset", SavePreset: "SetPreset", ClearPreset: "ClearPreset"}[type(request)]
+                self.running = code if isinstance(request, GotoPreset) else self.running
                 return self._command(ptz.preset(code, number, self._known_channel()))
             case Snapshot():
                 return self._snapshot()
@@ -100,20 +102,33 @@ class Amcrest:
 
     def _start(self, request: Start) -> object:
         channel = self._known_channel()
-        self.running = request.direction
+        self.running = ptz.code_of(request.direction)
         return self._command(ptz.start(request, channel))
+
+    def _drive(self, request: TurnFor | MoveTo | MoveOver) -> object:
+        channel = self._known_channel()
+        if isinstance(request, TurnFor):
+            self.running = "Continuously"
+            return self._command(ptz.turn_for(request, channel))
+        if isinstance(request, MoveTo):
+            self.running = request.form
+            return self._command(ptz.move_to(request, channel))
+        self.running = request.form
+        return self._command(ptz.move_over(request, channel))
 
     def _stop(self, request: Stop) -> object:
         channel = self._known_channel()
+        if self.running in ptz.UNSTOPPABLE:  # a start takes its place, and that can be stopped
+            self._start(Start(Direction.LEFT))
         refused: list[Refused] = []
-        known = request.direction or self.running
-        directions = [known] if known is not None and not request.every else list(Direction)
-        for direction in directions:
+        known = ptz.code_of(request.direction) if request.direction else self.running
+        codes = [known] if known is not None and not request.every else [*map(ptz.code_of, Direction)]
+        for code in codes:
             try:
-                self._command(ptz.stop(direction, channel), STOP)
+                self._command(ptz.stop(code, channel), STOP)
             except Refused as error:  # firmware that refuses to stop what does not run
                 refused.append(error)
-        if len(refused) == len(directions):
+        if len(refused) == len(codes):
             raise refused[0]
         return None
 
@@ -178,32 +193,14 @@ class Amcrest:
         return Identity(model, serial, system.read_version(self._get(system.magic("getSoftwareVersion")).text))
 
 
-class AmcrestEar:
-    """An Ear (`alarm/listener.py`) over the event stream; three heartbeats missed are the end."""
-
-    def __init__(self, address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> None:
-        self._endless = Endless(address, gate, BEATS * heartbeat_s)
-        self._target = events.attach(codes, heartbeat_s)
-
-    def listen(self) -> Iterator[list[Event]]:
-        """See `Ear`."""
-        with self._endless.open(self._target) as (response, pieces):
-            if response.is_closed:
-                replies.check(response)
-                raise Away("the camera gave a short answer instead of its events")
-            parser = events.Parser(events.boundary(response.headers.get("content-type", "")))
-            yield []
-            for piece in pieces:
-                yield parser.feed(piece)
-
-    def close(self) -> None:
-        """See `Ear`."""
-        self._endless.close()
-
-
 def ear(address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> Ear:
     """The camera's own alarms; it gives a sign of life every `heartbeat_s`."""
-    return AmcrestEar(address, gate, codes, heartbeat_s)
+    return DahuaEar(address, gate, codes, heartbeat_s)
+
+
+def sound(address: Address, gate: Gate) -> Sound:
+    """The camera's microphone and loudspeaker."""
+    return DahuaSound(address, gate)
 
 
 def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:
