@@ -34,6 +34,6 @@ class Wire(httpx.BaseTransport):
 
     def _control(self, target: str) -> httpx.Response:
         """A request acts when it has been processed."""
-        self.now += self.inside.device.latency.control()
+        self.now += self.inside.device.latency.control(self.now)
         answer = self.inside.device.answer(read(target), self.now)
         return httpx.Response(answer.status, headers={"Content-Type": answer.content_type}, content=answer.body)
