@@ -141,6 +141,7 @@ class CameraService:
         motion = self.motion.tick(now, turning=turning, online=self.health.online)
         if motion is not None:
             self.bulletin.say(topics.CAMERA_MOTION, motion)
+            self._begin(self.feed.at_motion(motion.value), now)
 
     def _begin(self, plan: Plan[None], now: float) -> None:
         """A plan whose end nobody waits for."""
