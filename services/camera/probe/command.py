@@ -15,6 +15,7 @@ from pydantic import SecretStr
 from rich.console import Console
 from rich.live import Live
 from rich.prompt import Confirm
+from rich.table import Table
 
 from services.camera.probe import paper, show
 from services.camera.probe.contact import Teller, contact
@@ -102,9 +103,14 @@ def _asked(console: Console, found: Findings, live: Live | None) -> bool:
 
 def _say_files(out: Console, files: list[Path], camera: Target) -> None:
     section, profile, report, *replies = files
-    out.print(f"\nIts section for the configuration:  {section}", markup=False)
-    out.print(f"Its firmware for the simulator:     {profile}", markup=False)
-    out.print(f"Everything as data:                 {report}", markup=False)
-    if replies:
-        out.print(f"{len(replies)} answers without names in      {replies[0].parent}", markup=False)
-    out.print(f"The password belongs into the environment or secrets.yaml as {PASSWORD.format(camera.name.upper())}.")
+    table = Table.grid(padding=(0, 2))
+    table.add_row("Its section for the configuration", str(section))
+    table.add_row("Its firmware for the simulator", str(profile))
+    table.add_row("Everything as data", str(report))
+    table.add_row(f"{len(replies)} answers without names", str(replies[0].parent) if replies else "")
+    out.print()
+    out.print(table)
+    out.print(
+        f"The password belongs into the environment or secrets.yaml as {PASSWORD.format(camera.name.upper())}.",
+        markup=False,
+    )

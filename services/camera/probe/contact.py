@@ -25,7 +25,10 @@ READS: tuple[tuple[str, Ask], ...] = (
     ("ONVIF", firmware.onvif),
 )
 MOVING = "Speeds, delays and directions"
-MOVES = ("mirror_inverts_motors", "move_status", "position_abs", "position_relative", "continuously", "tilt_share")
+MOVES = (
+    "mirror_inverts_motors", "move_status", "position_abs", "position_relative", "continuously", "moves",
+    "unset_preset", "tilt_share",
+)  # fmt: skip
 
 
 class Teller(Protocol):
@@ -33,6 +36,10 @@ class Teller(Protocol):
 
     def begin(self, step: str) -> None:
         """A step begins."""
+        ...
+
+    def detail(self, text: str) -> None:
+        """What a long step is at."""
         ...
 
     def end(self, step: str, found: Findings) -> None:
@@ -43,6 +50,7 @@ class Teller(Protocol):
 def contact(wire: Wire, teller: Teller, may_move: Callable[[Findings], bool]) -> Findings:
     """Everything that can be found out. DeviceError when the camera takes no login or cannot be asked at all."""
     found = Findings(wire.url)
+    wire.tell = teller.detail
     for step, ask in READS:
         _take(step, ask, wire, found, teller)
     if may_move(found):

@@ -15,6 +15,7 @@ from services.camera.requests import Refused
 
 CONFIG = "/cgi-bin/configManager.cgi?action=getConfig&name="
 NARROW = "VideoInOptions[0]"
+SNAPSHOTS = 3  # tries: some are dropped now and then
 ASKED = 20  # status readings for the latency
 CLOCK = "/cgi-bin/global.cgi?action=getCurrentTime"
 
@@ -50,8 +51,7 @@ def brackets(wire: Wire, found: Findings) -> None:
     encoded = wire.ask(f"{CONFIG}{NARROW.replace('[', '%5B').replace(']', '%5D')}", "VideoInOptions part, encoded")
     taken = (raw.good, encoded.good)
     found.switches["brackets"] = {(True, True): "both", (True, False): "raw", (False, True): "encoded"}.get(taken)
-    lines = raw.text.strip() or encoded.text.strip() if any(taken) else ""
-    found.switches["config_narrowing"] = bool(lines)
+    found.switches["config_narrowing"] = any(one.good and one.text.strip() for one in (raw, encoded))
     _daynight(wire, found, whole)
 
 
@@ -121,10 +121,12 @@ def capabilities(wire: Wire, found: Findings) -> None:
     caps = wire.ask(f"/cgi-bin/ptz.cgi?action=getCurrentProtocolCaps&channel={channel}", "getCurrentProtocolCaps")
     found.capabilities |= read_capabilities(read_table(caps.text))
     found.switches["preset_max"] = found.capabilities.get("presets")
+    found.switches |= {ours: found.capabilities[ours] for ours in ("tours", "auto_scan") if ours in found.capabilities}
     stored = read_table(wire.ask(f"/cgi-bin/ptz.cgi?action=getPresets&channel={channel}", "getPresets").text)
     if stored:
         found.switches["presets_form"] = "long" if any(key.endswith(".Type") for key in stored) else "short"
-    found.capabilities["presets_stored"] = sum(key.endswith(".Index") for key in stored)
+    numbers = (value for key, value in stored.items() if key.endswith(".Index") and value.isdigit())
+    found.capabilities["presets_stored"] = sorted(map(int, numbers))
     for kind in ("Input", "Output"):
         count = read_table(wire.ask(f"/cgi-bin/devAudio{kind}.cgi?action=getCollect", f"audio {kind.lower()}s").text)
         found.capabilities[f"audio_{kind[:-3].lower()}"] = int(count.get("result", "0") or "0")
@@ -134,7 +136,13 @@ def capabilities(wire: Wire, found: Findings) -> None:
 
 def read_capabilities(table: Mapping[str, str]) -> dict[str, Any]:
     """The camera's list as ours. Pure."""
-    flags = {"absolute": "MoveAbsolutely", "relative": "MoveRelatively", "zoom": "Zoom", "tours": "Tour"}
+    flags = {
+        "absolute": "MoveAbsolutely",
+        "relative": "MoveRelatively",
+        "zoom": "Zoom",
+        "tours": "Tour",
+        "auto_scan": "AutoScan",
+    }
     told: dict[str, Any] = {
         ours: table[f"caps.{theirs}"] == "true" for ours, theirs in flags.items() if f"caps.{theirs}" in table
     }
@@ -153,7 +161,10 @@ def pictures(wire: Wire, found: Findings) -> None:
     seconds: list[float] = []
     for channel in (None, 0, 1):
         query = "" if channel is None else f"?channel={channel}"
-        answer = wire.ask(f"/cgi-bin/snapshot.cgi{query}", "snapshot", PICTURE)
+        for _ in range(SNAPSHOTS):
+            answer = wire.ask(f"/cgi-bin/snapshot.cgi{query}", "snapshot", PICTURE)
+            if answer.body.startswith(b"\xff\xd8"):
+                break
         if answer.body.startswith(b"\xff\xd8"):
             good.append(channel)
             seconds.append(answer.seconds)

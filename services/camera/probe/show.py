@@ -39,6 +39,7 @@ WORDS: dict[str, tuple[str, dict[object, str]]] = {  # switch -> what it is, and
     "mirror_inverts_motors": ("Mirrored picture", {True: "turns the motors round", False: "leaves the motors"}),
     "position_abs": ("PositionABS", {"full": "goes there", "pan-only": "pan only", "bad-request": "is refused"}),
     "position_relative": ("Position (relative)", {"works": "is taken", "bad-request": "is refused"}),
+    "unset_preset": ("A preset never stored", {"error": "is refused", "ok": "is taken, and nothing happens"}),
     "continuously": ("Timed moves", {True: "are taken", False: "are refused"}),
     "heartbeat": ("Event stream", {True: "has a heartbeat", False: "is silent when nothing happens"}),
     "event_form": ("Events", {"A": "form A, with data", "B": "form B, without data"}),
@@ -57,6 +58,9 @@ class Lines:
         """Says which step it is."""
         self.number += 1
 
+    def detail(self, text: str) -> None:
+        """Not said: one line for each step."""
+
     def end(self, step: str, found: Findings) -> None:
         """Says that it is done, with what it has shown."""
         told = gist(step, found)
@@ -68,12 +72,17 @@ class Spinning(Lines):
 
     def __init__(self, console: Console, live: Live) -> None:
         super().__init__(console)
-        self.live = live
+        self.live, self.step = live, ""
 
     def begin(self, step: str) -> None:
         """Shows what it is doing."""
         super().begin(step)
+        self.step = step
         self.live.update(Spinner("dots", Text(f" {step} ...", "cyan")))
+
+    def detail(self, text: str) -> None:
+        """Shows what of it."""
+        self.live.update(Spinner("dots", Text(f" {self.step}: {text} ...", "cyan")))
 
     def end(self, step: str, found: Findings) -> None:
         """A tick and what was found."""
@@ -93,7 +102,7 @@ def gist(step: str, found: Findings) -> str:
         READS[4][0]: lambda: f"{meaning('brackets', told)}; {told['daynight']}",
         READS[5][0]: lambda: f"channel {' and '.join(map(str, told['ptz_channels']))}, looks at {where(found)}",
         READS[6][0]: lambda: (
-            f"{found.capabilities.get('presets', '?')} presets, {found.capabilities['presets_stored']} stored"
+            f"{found.capabilities.get('presets', '?')} presets, {len(found.capabilities['presets_stored'])} stored"
         ),
         READS[7][0]: lambda: "{median:.0f} ms, at worst {worst:.0f} ms".format(**found.latency_ms),
         READS[8][0]: lambda: (
@@ -152,7 +161,7 @@ def _head(found: Findings) -> Table:
         ("Serial number", found.serial),
         ("Picture", ", ".join(_words(size, found.picture))),
         ("Looks at", where(found)),
-        ("Presets", f"{can.get('presets', 'unknown')}, of them stored {can.get('presets_stored', 'unknown')}"),
+        ("Presets", f"{can.get('presets', 'unknown')}, of them stored {len(can.get('presets_stored', ()))}"),
         ("Sound", f"{can.get('audio_in', 0)} microphone(s), {can.get('audio_out', 0)} loudspeaker(s)"),
         ("Privacy mask", "yes" if can.get("privacy") else "no"),
         ("Answers", _times(found.latency_ms)),

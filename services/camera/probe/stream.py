@@ -14,13 +14,14 @@ from services.camera.probe.wire import Wire
 from services.camera.requests import Away
 
 ATTACH = "/cgi-bin/eventManager.cgi?action=attach&codes=[VideoMotion]&heartbeat=1"
+ENCODED = ATTACH.replace("[", "%5B").replace("]", "%5D")
 LISTEN_S = 3.5  # three heartbeats
 
 
 def events(wire: Wire, found: Findings, clock: Callable[[], float] = time.monotonic) -> None:
     """Listens for a few seconds. What was heard is kept for the fixtures."""
     try:
-        body = listen(wire, clock)
+        body = listen(wire, ENCODED if found.switches.get("brackets") == "encoded" else ATTACH, clock)
     except Away as error:
         found.unknown["heartbeat"] = found.unknown["event_form"] = str(error)
         return
@@ -30,10 +31,10 @@ def events(wire: Wire, found: Findings, clock: Callable[[], float] = time.monoto
         found.unknown["event_form"] = f"nothing moved in the {LISTEN_S:.0f} s that were listened to"
 
 
-def listen(wire: Wire, clock: Callable[[], float]) -> bytes:
+def listen(wire: Wire, target: str, clock: Callable[[], float]) -> bytes:
     """The bytes of the stream."""
     body, end = b"", clock() + LISTEN_S
-    with wire.stream(ATTACH, LISTEN_S) as response:
+    with wire.stream(target, LISTEN_S) as response:
         if response.status_code != 200:
             raise Away(f"the event stream was answered with {response.status_code}")
         try:

@@ -30,9 +30,10 @@ BACK = {
     Direction.UP: Direction.DOWN, Direction.DOWN: Direction.UP,
 }  # fmt: skip
 AXES = {"pan": Direction.RIGHT, "tilt": Direction.DOWN}
-ZEROS = {  # newer forms of moves: firmware that has them takes a zero of them
-    "position_relative": "code=Position&arg1=0&arg2=0&arg3=0",
-    "continuously": "code=Continuously&arg1=0&arg2=0&arg3=0&arg4=1",
+ZEROS: dict[str, tuple[str, object, object]] = {  # newer forms: firmware that has them takes a zero; then, else
+    "position_relative": ("start&code=Position&arg1=0&arg2=0&arg3=0", "works", "bad-request"),
+    "continuously": ("start&code=Continuously&arg1=0&arg2=0&arg3=0&arg4=1", True, False),
+    "moves": ("moveRelatively&arg1=0&arg2=0&arg3=0", "readings", "none"),
 }
 
 
@@ -68,6 +69,7 @@ class Turner:
         self.samples: list[tuple[bool, Sample]] = []  # whether it must have been moving
         self.rates: dict[tuple[str, int], float] = {}
         self.grows: dict[str, Direction] = {}  # which way the reading grows
+        self.resting: Sample | None = None  # where it stands, as long as nothing was started
         self.stood_at = 0.0  # when the first of the readings came that show it at rest
 
     def read(self) -> Sample:
@@ -89,6 +91,7 @@ class Turner:
             if self.wire.clock() > end:
                 raise Away("the camera does not come to rest")
         self.samples.append((False, last))
+        self.resting = last
         return last
 
     @contextmanager
@@ -96,6 +99,7 @@ class Turner:
         """Runs as long as the block does; the stop is sent until it is confirmed."""
         try:
             started = self.wire.ask(ptz.start(Start(direction, speed, speed), self.channel), "start")
+            self.resting = None
             if not started.good:
                 raise Refused(f"the camera refuses to turn: {started.status} {started.text[:60]!r}")
             yield started
@@ -112,7 +116,7 @@ class Turner:
 
     def run(self, direction: Direction, speed: int, seconds: float) -> Run:
         """Turns for so long after the answer to the start, and comes to rest."""
-        before = self.rest().reading
+        before = (self.resting or self.rest()).reading
         seen: list[Sample] = []
         with self.turning(direction, speed) as started:
             begun_at = started.sent + started.seconds
@@ -158,16 +162,31 @@ def turn(wire: Wire, found: Findings) -> None:
         _absolute(turner)
     finally:
         _home(turner, home)
-    for switch, arguments in ZEROS.items():
-        answer = wire.ask(f"/cgi-bin/ptz.cgi?action=start&channel={turner.channel}&{arguments}", f"{switch} of zero")
-        taken = answer.good and answer.text.split()[:1] == ["OK"]
-        found.switches[switch] = taken if switch == "continuously" else "works" if taken else "bad-request"
+    for switch, (action, works, otherwise) in ZEROS.items():
+        answer = wire.ask(f"/cgi-bin/ptz.cgi?channel={turner.channel}&action={action}", f"{switch} of zero")
+        found.switches[switch] = works if _done(answer) else otherwise
+    _nowhere(turner)
+
+
+def _done(answer: Exchange) -> bool:
+    return answer.status == 200 and answer.text.split()[:1] == ["OK"]
+
+
+def _nowhere(turner: Turner) -> None:
+    """What it says when it is sent to a preset that nobody has stored: it stays where it is."""
+    most, stored = turner.found.capabilities.get("presets", 1), turner.found.capabilities.get("presets_stored", [])
+    number = next((number for number in range(most, 0, -1) if number not in stored), None)
+    if number is not None:
+        answer = turner.wire.ask(ptz.preset("GotoPreset", number, turner.channel), "preset that is not stored")
+        turner.found.switches["unset_preset"] = "ok" if _done(answer) else "error"
+    turner.rest()
 
 
 def _speeds(turner: Turner, axis: str, direction: Direction) -> None:
     """Two runs at each level, there and a longer one back: their difference holds no delays."""
     starts: list[float] = []
     for level in LEVELS:
+        turner.wire.tell(f"{axis} at speed {level}")
         first = turner.run(direction, level, SHORT_S)
         if abs(first.turned) < STILL_DEG:
             direction = BACK[direction]  # it stands at an end stop
@@ -210,7 +229,7 @@ def _honesty(turner: Turner) -> None:
     if turner.found.switches.get("status_form") == "c":
         turner.found.unknown["move_status"] = "its status has no word for it"
         return
-    resting = {one.word for moves, one in turner.samples if not moves}
+    resting = {one.word for moves, one in turner.samples[1:] if not moves}  # it may be honest until it first moves
     turning = {one.word for moves, one in turner.samples if moves}
     if resting == {"Moving"}:
         turner.found.switches["move_status"] = "stuck"
@@ -222,6 +241,7 @@ def _honesty(turner: Turner) -> None:
 
 def _absolute(turner: Turner) -> None:
     """A few degrees aside by PositionABS, whose first argument is the travel, and back by the same."""
+    turner.wire.tell("an absolute position")
     here = turner.rest().reading
     aside = 1.0 if (here.pan + 180.0) % 360.0 < 180.0 else -1.0  # away from the dead arc
     down = 1.0 if here.tilt < 50.0 else -1.0
@@ -235,6 +255,8 @@ def _absolute(turner: Turner) -> None:
     level = abs(abs(tilt) - STEP_DEG) < 2.5 and abs(tilt) > 0.5
     if honest:
         turner.found.switches["position_abs"] = "full" if level else "pan-only"
+        beside = round(tilt - down * STEP_DEG, 1)
+        turner.found.switches["position_abs_tilt_off"] = beside if level and abs(beside) > 2 * STILL_DEG else 0.0
     else:
         turner.found.unknown["position_abs"] = f"taken, but it turned by {pan:.1f}, {tilt:.1f} degrees instead of 3, 3"
     _go(turner, here)
@@ -244,6 +266,7 @@ def _absolute(turner: Turner) -> None:
 def _go(turner: Turner, goal: Reading) -> Exchange:
     arguments = f"arg1={(180.0 - goal.pan) % 360.0:.1f}&arg2={goal.tilt:.1f}&arg3={goal.zoom:.0f}"
     target = f"/cgi-bin/ptz.cgi?action=start&channel={turner.channel}&code=PositionABS&{arguments}"
+    turner.resting = None
     return turner.wire.ask(target, "PositionABS")
 
 
@@ -264,9 +287,10 @@ def _watched(turner: Turner, origin: Reading) -> Sample:
 
 def _home(turner: Turner, home: Reading) -> None:
     """Back to where it looked, axis by axis, by runs that are a little too short."""
+    turner.wire.tell("back to where it looked")
     lag = turner.found.latency_ms.get("median", 300.0) / 1000
     for _ in range(RETURNS):
-        errors = dict(zip(AXES, difference(turner.rest().reading, home), strict=True))
+        errors = dict(zip(AXES, difference((turner.resting or turner.rest()).reading, home), strict=True))
         axis, error = max(errors.items(), key=lambda item: abs(item[1]))
         if abs(error) <= NEAR_DEG:
             return

@@ -61,6 +61,7 @@ class Wire:
     password: SecretStr
     clock: Callable[[], float] = time.monotonic
     pause: Callable[[float], None] = time.sleep
+    tell: Callable[[str], None] = lambda detail: None  # what a long step is at
     exchanges: list[Exchange] = field(default_factory=list)
     reuses: bool = False  # a nonce may be used again; found out by `login`
     proven: bool = False  # this user and password have worked

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from random import Random
 from threading import RLock
+from typing import Literal, TypeVar
 
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.events import Events
@@ -16,6 +17,7 @@ from services.simulators.camera.profiles import Profile
 from services.simulators.camera.ptz import Ptz
 from services.simulators.true_camera import WorldCamera
 
+T = TypeVar("T")
 Program = Callable[[Request, float], Answer]
 
 
@@ -29,6 +31,9 @@ class Device:
         self.ptz = Ptz(camera, profile, self.tables, self.latency, now)
         self.events = Events()
         self.boots_until = float("-inf")
+        self.clock_offset_s = 0.0  # how far its clock is ahead of the true time
+        self.rights = True  # whether the account may do more than look
+        self._dice = Random(camera.serial)
         self._lock = RLock()
         self._programs: dict[str, Program] = {
             "magicBox": self._magic_box,
@@ -43,6 +48,8 @@ class Device:
         """One request with a short answer."""
         if refuses_brackets(self.profile, request.target):
             return Answer(b"Error\r\nBad Request!\r\n", 400)
+        if not self.rights and (request.cgi.startswith("ptz") or request.action in ("setConfig", "reboot")):
+            return Answer(b"Error\r\nInvalid Authority!\r\n", 401)
         with self._lock:
             program = self._programs.get(request.cgi)
             return program(request, now) if program else Answer(b"", 404)
@@ -58,10 +65,16 @@ class Device:
         with self._lock:
             self.ptz.motors.place(pose, now)
 
-    def step(self, act: Callable[[], Answer]) -> Answer:
+    def step(self, act: Callable[[], T]) -> T:
         """Something that another program of the camera does, undisturbed by the others."""
         with self._lock:
             return act()
+
+    def drops_snapshot(self) -> Literal["close", "text"] | None:
+        """Whether this snapshot has no answer, or one that is no picture, as happens with some firmware."""
+        if self._dice.random() >= self.profile.snapshot_drop:
+            return None
+        return self._dice.choice(("close", "text"))
 
     def booting(self, now: float) -> bool:
         """Whether it is restarting and answers nobody."""
@@ -79,20 +92,21 @@ class Device:
             "getMachineName": [f"name={self.tables.text('General.MachineName')}"],
             "getVendor": ["vendor=Amcrest"],
         }
-        if request.action == "reboot":
+        if request.action in ("reboot", "shutdown"):  # some models come up again after a shutdown too
             return self.reboot(now)
         return lines(facts[request.action]) if request.action in facts else refusal(profile)
 
     def reboot(self, now: float) -> Answer:
         """Presets and configuration stay; the motors return to where they are after power-on."""
         self.boots_until = now + self.profile.boot_s
+        self.latency.drowsy_until = self.boots_until + self.profile.drowsy_s
         self.ptz.motors.place(Pose(*self.camera.starts_at), now)
         return OK
 
     def _global(self, request: Request, now: float) -> Answer:
         if request.action != "getCurrentTime":
             return refusal(self.profile)
-        return lines([f"result={time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(now))}"])
+        return lines([f"result={time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(now + self.clock_offset_s))}"])
 
     def _config_manager(self, request: Request, now: float) -> Answer:
         if request.action == "getTours":

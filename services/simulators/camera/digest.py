@@ -61,8 +61,8 @@ class Door:
         self._rng = rng
         self._used: dict[str, set[str]] = {}  # nonce -> its counts that were used
         self._records: dict[str, Record] = {}
-        self.account = ("", "")
         self.set_account(user, password)
+        self.first_account, self.locked = self.account, False
         self.opaque = f"{rng.getrandbits(104):026x}"
         self.refuses = profile.spurious_401
         self.counters = {"challenges": 0, "passed": 0, "wrong": 0, "stale": 0, "locked": 0, "spurious": 0}
@@ -76,7 +76,7 @@ class Door:
     def judge(self, method: str, target: str, header: str | None, now: float, address: str = "") -> Verdict:
         """`target` is the request target byte for byte; `header` the Authorization header; `address` who asks."""
         record = self.record(address)
-        if now < record.locked_until:
+        if self.locked or now < record.locked_until:
             return self._refused("locked", body=LOCKED_BODY)
         if header is None:
             return self._refused("challenges")
@@ -162,6 +162,8 @@ class Door:
         parts = [f'realm="{self.realm}"', f'qop="{self.profile.qop}"', f'nonce="{nonce}"', f'opaque="{self.opaque}"']
         parts += [f"algorithm={algorithm}"] if algorithm != "MD5" else []
         parts += ['stale="true"'] if stale else []
+        if self.profile.realm == "mac":  # the form that the first document of the API prints
+            parts = [parts[0], parts[2], f"stale={str(stale).upper()}", parts[1]]
         return "Digest " + (", " if self.profile.challenge_spacing == "spaced" else ",").join(parts)
 
 

@@ -6,6 +6,8 @@ GET  /log                                requests: time, method, target, status,
 POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand there at once
 POST /event    {"code", "action", "index"}
 POST /fail     {"n", "how"}              the next n requests: close, 401, 500 or text
+POST /fault    {"name", "on", ...}       switches a fault on or off; `troubles` lists them and what they take
+POST /well     {}                        switches every fault off
 POST /drop     {}                        cuts every connection
 POST /freeze   {"on"}                    accepts, and answers nobody
 POST /latency  {"seconds"}               of every control request from now on
@@ -19,7 +21,8 @@ from dataclasses import asdict
 from http.server import BaseHTTPRequestHandler
 from typing import Any
 
-from services.simulators.camera.http import CameraServer, Faults, Port
+from services.simulators.camera import troubles
+from services.simulators.camera.http import CameraServer, Port
 from services.simulators.camera.motors import Axes, reading
 
 Order = Callable[[CameraServer, dict[str, Any]], object]
@@ -42,7 +45,7 @@ def state(camera: CameraServer) -> dict[str, Any]:
 def motors(camera: CameraServer) -> dict[str, Any]:
     """The constants of each axis (pan as travel: reading = (180 - travel) mod 360), and what has been done so far."""
     ptz = camera.device.ptz
-    worked = ptz.motors.worked(camera.clock())
+    worked = camera.device.step(lambda: ptz.motors.worked(camera.clock()))
     axes = {name: asdict(rail) for name, rail in zip(Axes._fields, ptz.motors.rails, strict=True)}
     done = {"travelled": worked.travelled._asdict(), "pushed_s": worked.pushed_s._asdict()}
     return {"axes": axes, **done, "motions": worked.motions, "commands": ptz.commands}
@@ -59,7 +62,7 @@ def _event(camera: CameraServer, order: dict[str, Any]) -> None:
 
 
 def _fail(camera: CameraServer, order: dict[str, Any]) -> None:
-    camera.faults = Faults(int(order["n"]), str(order.get("how", "close")))
+    camera.faults.left, camera.faults.how = int(order["n"]), str(order.get("how", "close"))
 
 
 def _freeze(camera: CameraServer, order: dict[str, Any]) -> None:
@@ -76,6 +79,8 @@ ORDERS: dict[str, Order] = {
     "/pose": _pose,
     "/event": _event,
     "/fail": _fail,
+    "/fault": troubles.switch,
+    "/well": lambda camera, order: troubles.clear(camera),
     "/drop": lambda camera, order: camera.drop(),
     "/freeze": _freeze,
     "/latency": _latency,
