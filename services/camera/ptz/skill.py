@@ -68,6 +68,7 @@ class Skill:
     senses: tuple[Sense, Sense, Sense] = field(default_factory=lambda: (Sense(), Sense(), Sense(sure=True)))
     timing: Timing = field(default_factory=Timing)
     picture: tuple[bool, bool] = (False, False)  # flip and mirror, with which the senses were seen
+    surprise: float = 0.1  # s: how far off a place of rest is reckoned, over the speed before it
     diagonals: bool = True
     zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
