@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, cast
 
-from services.camera import orders
+from services.camera import commands, orders
 from services.camera.bulletin import Bulletin
 from services.camera.health import Health
+from services.camera.looks import Looks
 from services.camera.orders import Command
 from services.camera.places import Places
 from services.camera.plan import Plan, ask, attempt, wait
@@ -23,6 +24,7 @@ from services.camera.requests import (
     Status,
 )
 from services.camera.scan.scanner import Scanner
+from services.camera.sound.takes import Takes
 from services.camera.video.feed import Feed
 from services.payloads import Place
 
@@ -35,11 +37,15 @@ UP_S = 180.0  # 40 to 105 s were seen
 class Chores:
     """Makes the plan for each of these orders."""
 
-    def __init__(self, places: Places, scanner: Scanner, health: Health, bulletin: Bulletin, feed: Feed) -> None:
+    def __init__(
+        self, places: Places, scanner: Scanner, health: Health, bulletin: Bulletin, feed: Feed, takes: Takes
+    ) -> None:
         self.places = places
         self.scanner = scanner
         self.health = health
         self.bulletin = bulletin
+        self.looks = Looks(bulletin.facts)
+        self.takes = takes
         self._plans: dict[type, Callable[[Any, float], Plan[None]]] = {
             orders.SavePlace: self._save,
             orders.RemovePlace: self._remove,
@@ -47,6 +53,10 @@ class Chores:
             orders.Targets: self._targets,
             orders.Routine: self._routine,
             orders.Options: self._options,
+            commands.VideoMode: lambda order, now: self.looks.mode(order),
+            commands.HideLens: lambda order, now: self.looks.privacy(order),
+            commands.RecordSound: lambda order, now: self.takes.record(order, now),
+            commands.PlaySound: lambda order, now: self.takes.play(order, now),
             orders.Broadcast: feed.switch,
             orders.Restart: self._restart,
         }

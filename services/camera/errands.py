@@ -1,4 +1,4 @@
-"""Requests about the device itself: its clock, its alarms, its privacy mode, its contrast, its storage. Values only.
+"""Requests about the device itself: its clock, its alarms, its privacy mode, contrast, storage, sound. Values only.
 
 They have the rank of settings. What they are in a brand's words is in `brands/`; a brand may refuse any of them.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from pathlib import Path
 
 from services.camera.requests import Errand
 
@@ -66,3 +67,31 @@ class Storage:
     state: str
     total: float = 0.0
     used: float = 0.0
+
+
+@dataclass(frozen=True)
+class Record(Errand):
+    """Records from the microphone into that file; the answer is a Recorded. It takes its own time (`sound/desk.py`)."""
+
+    seconds: float
+    file: Path
+
+
+@dataclass(frozen=True)
+class EndRecording(Errand):
+    """Ends the recording that runs; what there is of it is kept."""
+
+
+@dataclass(frozen=True)
+class Play(Errand):
+    """Plays that WAV file on the loudspeaker; answered when it has been played."""
+
+    file: Path
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A recording: its length, and the size of its file."""
+
+    seconds: float
+    bytes: int

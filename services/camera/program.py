@@ -14,6 +14,7 @@ from services.camera.scan.analysis import Pool
 from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
+from services.camera.sound.desk import Desk
 from services.camera.video.channel import Channel
 from services.camera.watchdog import Watchdog, brand, connector
 from services.camera.web.gate import Gate
@@ -30,10 +31,12 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     watchdog = Watchdog(config.brand, address)
     gate = Gate(config.login_retry_s)
     device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell)
+    made_sound = getattr(brand(config.brand), "sound", None)
+    sender = Desk(device, made_sound(address, gate) if made_sound else None, post)
     channel = Channel(config.name, config.stream, address, config.kind, post, gate)
     listener = _listener(config, address, gate, post)
     try:
-        service = CameraService(config, device, lambda: Pool(post, config.workers), view, channel)
+        service = CameraService(config, sender, lambda: Pool(post, config.workers), view, channel)
         try:
             yield service
         finally:
@@ -41,7 +44,7 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     finally:
         if listener is not None:
             listener.close()
-        device.close()
+        sender.close()
         watchdog.close()
         channel.close()
 

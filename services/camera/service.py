@@ -19,7 +19,7 @@ from services.camera.bulletin import Bulletin
 from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.device import REPLY, Sender
 from services.camera.discovery import Discovery
-from services.camera.health import Health
+from services.camera.health import IDLE_S, Health
 from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
@@ -32,13 +32,16 @@ from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
 from services.camera.scan.sightings import Eye
 from services.camera.settings import Config
+from services.camera.sound.takes import Takes
+from services.camera.upkeep import Upkeep
 from services.camera.video.channel import ASKED, Channel
 from services.camera.video.feed import Feed
 from services.errors import BadMessage
 from services.payloads import Order, OrderState, PositionSet
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
-FRESH_S = 2.0  # a reading as old as this still tells where a camera at rest looks
+STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
+FRESH_S = 3.0  # a reading as old as this still tells where a camera at rest looks
 
 
 class CameraService:
@@ -81,8 +84,10 @@ class CameraService:
         self.scanner = Scanner(config, self.skill, eye, analyst, self.bulletin, self.places)
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
-        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed)
+        takes = Takes(config.name, config.folder / config.audio, publish)
+        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes)
         self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=config.alarm)
+        self.upkeep = Upkeep(config.name, config.clock, self.bulletin.facts, self._has_time)
         self._polling = False
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
@@ -123,7 +128,7 @@ class CameraService:
         """Wakes the plans, and publishes what has changed."""
         if not self._polling:
             self._polling = True
-            for plan in (self._poll(now), self.feed.run(now), self.feed.every_so_often(now)):
+            for plan in (self._poll(now), self.feed.run(now), self.feed.every_so_often(now), self.upkeep.plan(now)):
                 self.stage.begin(plan, now, _nobody)
         self.stage.tick(now)
         self.motors.tick(now)
@@ -141,6 +146,12 @@ class CameraService:
         motion = self.motion.tick(now, turning=turning, online=self.health.online)
         if motion is not None:
             self.bulletin.say(topics.CAMERA_MOTION, motion)
+        self.bulletin.facts.values["alarm"] = self.motion.fact
+        self.bulletin.facts.complain("alarm", f"motion alarm {self.motion.fact}" if self.motion.trouble else "")
+        self.bulletin.facts.values["request_queue"] = str(len(self.stage.asked))
+
+    def _has_time(self) -> bool:
+        return self.health.online and not self.health.rebooting and not self.motors.busy
 
     def _begin(self, plan: Plan[None], now: float) -> None:
         """A plan whose end nobody waits for."""
@@ -181,12 +192,16 @@ class CameraService:
         while True:
             now = yield from wait(max(now + 0.05, self.health.next_poll))
             if self.motors.busy or self.health.rebooting:
+                met = met and not self.health.rebooting
                 now = yield from wait(now + BUSY_S)
                 continue
             now = (yield from attempt(Status())).received
+            if self.health.online and self.bulletin.still_for(now) > STIRRED_S:
+                self.health.next_poll += REST_S - IDLE_S
             if self.health.online and not met:
                 yield from attempt(Identify())
                 now = (yield from attempt(GetPicture())).received
+                self.upkeep.met()
                 if self.bulletin.turning:
                     self.motors.make_sure(now)
             met = self.health.online

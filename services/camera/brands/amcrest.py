@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import httpx
 
 from services.camera.address import Address
 from services.camera.alarm.listener import Ear
-from services.camera.brands.dahua import errands, events, picture, ptz, replies, streams, system
+from services.camera.brands.dahua import errands, picture, ptz, replies, streams, system
 from services.camera.requests import (
     Away,
     Camera,
     ClearPreset,
     Direction,
     Errand,
-    Event,
     FindStream,
     GetPicture,
     GotoPreset,
@@ -32,12 +29,11 @@ from services.camera.requests import (
     Status,
     Stop,
 )
+from services.camera.sound.desk import Sound
 from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch
+from services.camera.web.dahua import DahuaEar, DahuaSound
 from services.camera.web.digest import Login
-from services.camera.web.endless import Endless
 from services.camera.web.gate import Gate
-
-BEATS = 3.25  # so many heartbeats of silence are the end: three were missed, and one may be late
 
 
 class Amcrest:
@@ -178,32 +174,14 @@ class Amcrest:
         return Identity(model, serial, system.read_version(self._get(system.magic("getSoftwareVersion")).text))
 
 
-class AmcrestEar:
-    """An Ear (`alarm/listener.py`) over the event stream; three heartbeats missed are the end."""
-
-    def __init__(self, address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> None:
-        self._endless = Endless(address, gate, BEATS * heartbeat_s)
-        self._target = events.attach(codes, heartbeat_s)
-
-    def listen(self) -> Iterator[list[Event]]:
-        """See `Ear`."""
-        with self._endless.open(self._target) as (response, pieces):
-            if response.is_closed:
-                replies.check(response)
-                raise Away("the camera gave a short answer instead of its events")
-            parser = events.Parser(events.boundary(response.headers.get("content-type", "")))
-            yield []
-            for piece in pieces:
-                yield parser.feed(piece)
-
-    def close(self) -> None:
-        """See `Ear`."""
-        self._endless.close()
-
-
 def ear(address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> Ear:
     """The camera's own alarms; it gives a sign of life every `heartbeat_s`."""
-    return AmcrestEar(address, gate, codes, heartbeat_s)
+    return DahuaEar(address, gate, codes, heartbeat_s)
+
+
+def sound(address: Address, gate: Gate) -> Sound:
+    """The camera's microphone and loudspeaker."""
+    return DahuaSound(address, gate)
 
 
 def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:

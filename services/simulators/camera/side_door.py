@@ -45,7 +45,7 @@ def state(camera: CameraServer) -> dict[str, Any]:
 def motors(camera: CameraServer) -> dict[str, Any]:
     """The constants of each axis (pan as travel: reading = (180 - travel) mod 360), and what has been done so far."""
     ptz = camera.device.ptz
-    worked = ptz.motors.worked(camera.clock())
+    worked = camera.device.step(lambda: ptz.motors.worked(camera.clock()))
     axes = {name: asdict(rail) for name, rail in zip(Axes._fields, ptz.motors.rails, strict=True)}
     done = {"travelled": worked.travelled._asdict(), "pushed_s": worked.pushed_s._asdict()}
     return {"axes": axes, **done, "motions": worked.motions, "commands": ptz.commands}
