@@ -31,6 +31,7 @@ class Health:
     latency: float = 0.0
     failures: int = 0
     rebooting: bool = False
+    stream: str = ""  # why no moving picture comes although it was ordered
     moving: bool = False  # a motion is to be stopped: losing the camera now is worse than offline
 
     @property
@@ -41,6 +42,8 @@ class Health:
     @property
     def status(self) -> CameraStatus:
         """What is published."""
+        if self.online and self.stream:
+            return CameraStatus(state="degraded", reason=self.stream)
         return CameraStatus(state=self.state, reason=self.reason)
 
     def take(self, reply: Reply) -> None:

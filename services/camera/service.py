@@ -146,6 +146,7 @@ class CameraService:
         motion = self.motion.tick(now, turning=turning, online=self.health.online)
         if motion is not None:
             self.bulletin.say(topics.CAMERA_MOTION, motion)
+            self._begin(self.feed.at_motion(motion.value), now)
         self.bulletin.facts.values["alarm"] = self.motion.fact
         self.bulletin.facts.complain("alarm", f"motion alarm {self.motion.fact}" if self.motion.trouble else "")
         self.bulletin.facts.values["request_queue"] = str(len(self.stage.asked))
