@@ -23,10 +23,8 @@ from services.camera.health import IDLE_S, Health
 from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
-from services.camera.ptz.goal import Goal
+from services.camera.ptz.errands import Errands
 from services.camera.ptz.motors import Motors
-from services.camera.ptz.move import Arrival, goto
-from services.camera.ptz.skill import Skill
 from services.camera.requests import GetPicture, Identify, Identity, Picture, Rank, Reading, Refused, Reply, Status
 from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
@@ -41,7 +39,6 @@ from services.payloads import Order, OrderState, PositionSet
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
 STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
-FRESH_S = 3.0  # a reading as old as this still tells where a camera at rest looks
 
 
 class CameraService:
@@ -73,15 +70,14 @@ class CameraService:
         publish = self._out.append
         self.places = Places(config.folder / config.places)
         self.health = Health(config.name)
-        self.skill = Skill()
-        self.skill.forget_senses(flip=config.picture.flip, mirror=config.picture.mirror)
         self.bulletin = Bulletin(config.name, self.health, self.places, publish)
         self.bulletin.diagnostics = config.diagnostics
         self.discovery = Discovery(config.name, publish, on=config.discovery)
         self.answers = Answers(config.name, publish, self.bulletin.position)
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
-        self.scanner = Scanner(config, self.skill, eye, analyst, self.bulletin, self.places)
+        self.errands = Errands(config, self.bulletin, self.places)
+        self.scanner = Scanner(config, self.errands.skill, eye, analyst, self.bulletin, self.places)
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
@@ -146,6 +142,7 @@ class CameraService:
         motion = self.motion.tick(now, turning=turning, online=self.health.online)
         if motion is not None:
             self.bulletin.say(topics.CAMERA_MOTION, motion)
+            self._begin(self.feed.at_motion(motion.value), now)
         self.bulletin.facts.values["alarm"] = self.motion.fact
         self.bulletin.facts.complain("alarm", f"motion alarm {self.motion.fact}" if self.motion.trouble else "")
         self.bulletin.facts.values["request_queue"] = str(len(self.stage.asked))
@@ -179,14 +176,14 @@ class CameraService:
             self._take_picture(reply.result)
         elif isinstance(reply.result, Identity):
             self.bulletin.identity = reply.result
+            self.errands.meet(reply.result)
         self.stage.reply(reply, now)
 
     def _take_picture(self, picture: Picture) -> None:
-        """The motors follow the picture: when its options changed, which way they turn is to be seen anew."""
+        """The motors and the streams follow the picture."""
         old, self.scanner.picture = self.scanner.picture, picture
         self.feed.turned(picture)
-        if (picture.flip, picture.mirror) != (old.flip, old.mirror):
-            self.skill.forget_senses(flip=picture.flip, mirror=picture.mirror)
+        self.errands.see(picture, old)
 
     def _poll(self, now: float) -> Plan[None]:
         """Asks where the camera looks while nobody else does, and who it is after it was away."""
@@ -258,7 +255,7 @@ class CameraService:
         if not free and not self.health.online:
             raise Refused(f"the camera is {self.health.state}: {self.health.reason}")
         if isinstance(command, GotoPlace | LookAt):
-            self._goal(command)
+            self.errands.goal(command)
         elif isinstance(command, orders.RemovePlace):
             self.places.get(command.place)
         elif isinstance(command, orders.Broadcast):
@@ -266,30 +263,11 @@ class CameraService:
         elif isinstance(command, ScanFor):
             self.scanner.check(command)
 
-    def _goal(self, command: GotoPlace | LookAt) -> Goal:
-        """Where an order wants to look; what it leaves out stays as it is."""
-        here = self.bulletin.known()
-        if isinstance(command, GotoPlace):
-            place = self.places.get(command.place)
-            return self.config.limits.goal(place.pan, place.tilt, place.zoom)
-        pan = here.pan if command.pan is None else command.pan
-        tilt = here.tilt if command.tilt is None else command.tilt
-        zoom = here.zoom if command.zoom is None else command.zoom
-        return self.config.limits.goal(pan, tilt, zoom)
-
     def _motor_plan(self, command: Command, now: float) -> Plan[object]:
         if isinstance(command, ScanFor):
             return self.scanner.plan(command, now)
         assert isinstance(command, GotoPlace | LookAt)
-        near = self.bulletin.at_rest(now, FRESH_S)
-        until = now + self.config.move_timeout_s
-        return self._moved(goto(self._goal(command), self.config.limits, self.skill, until, near=near))
-
-    def _moved(self, plan: Plan[Arrival]) -> Plan[Arrival]:
-        """A move, after which it is known that the camera rests."""
-        arrival = yield from plan
-        self.bulletin.rests(arrival.reading, arrival.at)
-        return arrival
+        return self.errands.plan(command, now)
 
     def _motor_ended(self, job: Job, state: OrderState, error: str | None, now: float) -> None:
         if isinstance(job.command, ScanFor):

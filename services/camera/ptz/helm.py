@@ -20,6 +20,8 @@ LATE_DOUBT_S = 0.06  # the age of readings is not known well: two equal ones, th
 LONGEST_DOUBT_S = 0.35
 EARLY = 0.4  # of what zoom has before it, at most, is given up for not knowing its rate
 FOREVER = 1e12
+WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
+SURPRISES = 0.2  # of what was known before is replaced by each rest
 DIRECTIONS = {direction.value: direction for direction in Direction}
 Levels = tuple[int, int, int]
 
@@ -83,6 +85,7 @@ class Helm:
         now = yield from wait(max(now, settled))
         reply = yield from self.send(Status())
         reading = cast(Reading, reply.result)
+        self._weigh(reading)
         self.course.read(reply, reading)
         while self.zoom_ends is None and (pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading)):
             again = yield from self.send(Status())
@@ -94,6 +97,22 @@ class Helm:
         self._place_zoom(reading)
         self.stand(reading)
         return reading, reply.received
+
+    def _weigh(self, reading: Reading) -> None:
+        """How well the place of rest was reckoned, in seconds of the fastest motion before it."""
+        pose = self.limits.pose(reading)
+        for axis in (PAN, TILT):
+            told, pace = self.course.told[axis], self.skill.paces[axis]
+            fastest = max((pace.rate(abs(one.level)) for one in told if one.level), default=0.0)
+            if fastest > WEIGHED_DEG_S:
+                wrong = max(0.0, abs(pose[axis] - self.course.stopped(axis, FOREVER)) - NOISE_DEG) / fastest
+                self.skill.surprise += SURPRISES * (wrong - self.skill.surprise)
+
+    def reckoned(self, axis: int) -> float:
+        """How far off the reckoned place of rest of an axis may be, degrees."""
+        told, pace = self.course.told[axis], self.skill.paces[axis]
+        fastest = max((pace.rate(abs(one.level)) for one in told if one.level), default=0.0)
+        return 2 * self.skill.surprise * fastest
 
     def _odd(self, reading: Reading) -> bool:
         """Whether a reading at rest is not what was reckoned: it may not be at rest."""

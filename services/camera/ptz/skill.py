@@ -67,6 +67,8 @@ class Skill:
     )
     senses: tuple[Sense, Sense, Sense] = field(default_factory=lambda: (Sense(), Sense(), Sense(sure=True)))
     timing: Timing = field(default_factory=Timing)
+    picture: tuple[bool, bool] = (False, False)  # flip and mirror, with which the senses were seen
+    surprise: float = 0.1  # s: how far off a place of rest is reckoned, over the speed before it
     diagonals: bool = True
     zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
@@ -78,6 +80,7 @@ class Skill:
 
     def forget_senses(self, *, flip: bool, mirror: bool) -> None:
         """The picture's options changed, and these swap the motors: guess, and look at the next motion."""
+        self.picture = (flip, mirror)
         self.senses[0].sign, self.senses[0].sure = (1 if mirror else -1), False
         self.senses[1].sign, self.senses[1].sure = (1 if flip else -1), False
 

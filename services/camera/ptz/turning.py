@@ -10,11 +10,12 @@ from typing import cast
 from services.camera.plan import Plan, wait
 from services.camera.ptz.course import PAN, TILT
 from services.camera.ptz.helm import Helm, levels_of, sign
-from services.camera.ptz.leg import NEAR_DEG, Leg, Way, choose
+from services.camera.ptz.leg import GOOD_DEG, NEAR_DEG, Leg, Way, choose
 from services.camera.ptz.zooming import Zooming
 from services.camera.requests import Reading, Refused, Status
 
-RUNGS = 4  # legs without a rest between them
+RUNGS = 6  # legs without a rest between them
+RECKONED_DEG = 0.3
 FEW_COMMANDS = 5  # after so many, accuracy goes before time
 DEARER = 0.7  # each command more makes a correction so much dearer
 PROBE_DEG_S = 9.0
@@ -35,23 +36,41 @@ class Turning:
         if self.helm.zoom_ends is not None:
             now = yield from wait(self.helm.zoom_ends)
         try:
-            now = yield from (self._probe(unsure) if unsure else self._swing(axes, now))
-            for _ in range(RUNGS):
-                leg, turning = self._choose(axes, now)
-                now = (yield from self.helm.start(levels_of(turning))).received
-                now = yield from self._see_through(leg, turning, now)
-                others = [axis for axis in axes if axis not in leg.parts]
-                axes = others or self._goes_on(leg, now)
-                if not axes:
-                    break
+            if unsure:
+                now = yield from self._probe(unsure)
+            return (yield from self._legs(axes, now, zoom=zoom))
         except Refused:
             if not self.helm.skill.diagonals or len(axes) < 2:
                 raise
             self.helm.skill.diagonals = False
             return (yield from self.turn(axes, now, zoom=zoom))
-        if zoom:
-            return (yield from self.zooming.begin())
+
+    def _legs(self, axes: list[int], now: float, *, zoom: bool) -> Plan[float]:
+        """Legs without a reading between them, as long as it is known well enough where each one ends."""
+        for _ in range(RUNGS):
+            now = yield from self._swing(axes, now)
+            leg, turning = self._choose(axes, now)
+            now = (yield from self.helm.start(levels_of(turning))).received
+            now = yield from self._see_through(leg, turning, now)
+            others = [axis for axis in axes if axis not in leg.parts]
+            axes = others or self._goes_on(leg, now)
+            if axes:
+                continue
+            now = yield from (self.zooming.begin() if zoom else self.helm.stop(now))
+            zoom, axes = False, self._reckon(now)
+            if not axes:
+                return now
+            if self.helm.zoom_ends is not None:
+                now = yield from wait(max(now, self.helm.zoom_ends))
         return (yield from self.helm.stop(now))
+
+    def _reckon(self, now: float) -> list[int]:
+        """The axes that will rest beside the goal, where that is reckoned well enough to go on without a reading."""
+        turned = [axis for axis in (PAN, TILT) if self.helm.course.told[axis]]
+        if any(self.helm.reckoned(axis) > RECKONED_DEG for axis in turned):
+            return []
+        off = {axis: abs(self.helm.aim[axis] - self.helm.course.stopped(axis, now)) for axis in turned}
+        return [axis for axis, distance in off.items() if distance > GOOD_DEG]
 
     def _see_through(self, leg: Leg, turning: dict[int, int], now: float) -> Plan[float]:
         """From the start of a leg to the time for its end; an axis that ends before the other is ended."""
@@ -76,7 +95,7 @@ class Turning:
         """Where even the smallest step is too long, it begins the other way; the leg then turns it round."""
         levels = [0, 0, 0]
         for axis in axes if self.helm.skill.diagonals else axes[:1]:
-            distance, least = self.helm.aim[axis] - self.helm.course.origin[axis], self.helm.least(axis)
+            distance, least = self.helm.aim[axis] - self.helm.course.stopped(axis, now), self.helm.least(axis)
             if least - abs(distance) > NEAR_DEG:
                 levels[axis] = -sign(distance)
         if any(levels):

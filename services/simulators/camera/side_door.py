@@ -1,6 +1,6 @@
 """The tests' way in, on a port of its own: JSON to see and to change what no real camera would tell.
 
-GET  /state                              true pose, reading, motion, counters of the door
+GET  /state                              true pose, reading, motion, the door's counters, frames rendered and their rate
 GET  /motors                             what they can (position, speeds, accelerations) and what they did (counters)
 GET  /log                                requests: time, method, target, status, authorized
 POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand there at once
@@ -39,6 +39,7 @@ def state(camera: CameraServer) -> dict[str, Any]:
         "booting": camera.device.booting(now),
         "presets": {number: name for number, (name, _) in camera.device.ptz.presets.items()},
         "door": camera.door.counters,
+        **camera.pictures.rates(),
     }
 
 
