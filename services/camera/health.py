@@ -9,7 +9,7 @@ import logging
 from dataclasses import dataclass
 from typing import Literal
 
-from services.camera.requests import Away, BadLogin, Locked, Reply
+from services.camera.requests import Away, BadLogin, Locked, Reply, Status
 from services.payloads import CameraStatus
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0  # between attempts to reach a camera that is away
@@ -78,8 +78,10 @@ class Health:
         self.state, self.reason = state, reason
 
     def _there(self, reply: Reply) -> None:
-        if self.state != "online":
-            log.info("%s: online", self.name)
-        self.state, self.reason, self.failures = "online", "", 0
+        """It is online when it was asked where it looks (a camera without motors says no); nothing else counts."""
         self.latency += 0.2 * (reply.received - reply.sent - self.latency)
-        self.next_poll = reply.received + IDLE_S
+        if isinstance(reply.request, Status):
+            if self.state != "online":
+                log.info("%s: online", self.name)
+            self.state, self.reason, self.failures = "online", "", 0
+            self.next_poll = reply.received + IDLE_S
