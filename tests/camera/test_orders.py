@@ -189,8 +189,8 @@ def still(here: Here) -> None:
 
 def zoomed(level: float | None) -> Step:
     def check(here: Here) -> None:
-        zoom = here.door.state()["pose"]["zoom"]
-        assert zoom > 0.5 if level is None else abs(zoom - level) <= 0.5
+        zoom = here.door.state()["reading"]["zoom"]  # of the true one it tells five levels
+        assert zoom > 0 if level is None else zoom == level
         assert not here.door.moving
 
     return check
@@ -283,6 +283,29 @@ def streams(here: Here) -> None:
     assert b"image/jpeg" in piece
 
 
+def is_watched(here: Here) -> None:
+    frames = here.door.state()["frames_rendered"]
+    here.until(lambda: here.door.state()["frames_rendered"] != frames, "a frame that somebody watches")
+    assert here.said("stream")["rtsp"]
+
+
+def stops_watching(here: Here) -> None:
+    ordered("RTSP", "False")(here)
+    here.until(lambda: not here.retained("stream")["rtsp"], "the stream to be off")
+
+
+def high_contrast(here: Here) -> None:
+    option("VideoInOptions[0].DayNightColor", "2")(here)
+    contrast = {key: value for key, value in here.flat.table("ip1", "VideoColor").items() if key.endswith("Contrast")}
+    assert contrast
+    assert all(int(value) > 50 for value in contrast.values())
+
+
+def usual_contrast(here: Here) -> None:
+    ordered("VideoMode", "color")(here)
+    option("VideoColor[0][0].Contrast", "50", "VideoColor")(here)
+
+
 def rebooted(here: Here) -> None:
     assert any("action=reboot" in entry["target"] for entry in here.door.log())
     assert not here.door.state()["booting"]
@@ -300,10 +323,12 @@ CASES = (
     Case("Move", "Stop", still, turning),
     Case("Zoom", "In", zoomed(None), stands_at(60.0, 20.0)),
     Case("Zoom", "4", zoomed(4.0), stands_at(60.0, 20.0)),
+    Case("RTSP", "1", is_watched, after=stops_watching),
     Case("MJPEG", "ON", streams, after=ordered("MJPEG", "OFF")),
     Case("Mirror", "False", option("VideoInOptions[0].Mirror", "false"), after=ordered("Mirror", "True")),
     Case("Flip", "0", option("VideoInOptions[0].Flip", "false"), after=ordered("Flip", "1")),
     Case("VideoMode", "bw", option("VideoInOptions[0].DayNightColor", "2"), after=ordered("VideoMode", "color")),
+    Case("VideoMode", "scan", high_contrast, after=usual_contrast),
     Case("Scan", ONE_PLACE, found),
     Case("Scan", "False", cancelled, scanning),
     Case("ScanImgPub", "ON", shown, after=ordered("ScanImgPub", "OFF")),
