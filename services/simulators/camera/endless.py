@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from services.simulators.camera.http import CameraServer
 
 Endless = Callable[["CameraServer", Request], Generator[bytes]]
+FULL = b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
 HEARTBEATS_S = (1.0, 60.0)
 
 
@@ -34,16 +35,20 @@ def attach(camera: CameraServer, request: Request) -> Generator[bytes]:
     least, most = HEARTBEATS_S
     beat = request.text("heartbeat")
     every = min(max(float(beat), least), most) if beat.isdigit() else most
+    profile = camera.device.profile
     subscription = camera.device.events.subscribe(events.wanted(request.text("codes")))
+    if subscription is None:
+        yield FULL
+        return
     try:
-        yield events.START
+        yield events.head(profile)
         while not camera.closing.is_set():
             text = subscription.next(every)
             camera.running.wait()
             if text == "":
                 return
-            if text or (beat and camera.device.profile.heartbeat):
-                yield events.part(text or "Heartbeat")
+            if (text or (beat and profile.heartbeat)) and not camera.faults.silent_events:
+                yield events.part(profile, text or "Heartbeat")
     finally:
         camera.device.events.leave(subscription)
 

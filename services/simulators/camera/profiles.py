@@ -29,8 +29,15 @@ class Profile:
     mirror_inverts_motors: bool = True
     error_style: Literal["400-body", "200-error", "501"] = "200-error"
     daynight: Literal["VideoInOptions", "VideoInDayNight"] = "VideoInOptions"
+    device_class: bool = True  # it answers getDeviceClass
+    lens_mask: bool = True  # it can turn the lens away (LeLensMask)
     config_narrowing: bool = True  # a narrowed table name works; otherwise it gives an empty answer
     heartbeat: bool = True
+    event_form: Literal["A", "B"] = "B"  # A has data
+    event_header_twice: bool = False  # a second header block before the first part
+    event_length_space: bool = False  # after `Content-Length:`
+    event_blank_lines: int = 0  # more than needed between two parts
+    event_listeners: int = 25
     onvif: bool = True  # it has the ONVIF services too
     latency_s: float = 0.3  # of each control request
     latency_spread_s: float = 0.1
@@ -50,7 +57,13 @@ class Profile:
 PROFILES: dict[str, Profile] = {
     "ip3m-941w-2019": Profile(),
     "ip2m-841b-strict": Profile(
-        model="IP2M-841B", auth="basic", ptz_channels=(1,), status_form="b", error_style="400-body"
+        model="IP2M-841B",
+        auth="basic",
+        device_class=False,
+        lens_mask=False,
+        ptz_channels=(1,),
+        status_form="b",
+        error_style="400-body",
     ),
     "2020s-dahua": Profile(
         model="IPC-AW46WN",
@@ -63,5 +76,8 @@ PROFILES: dict[str, Profile] = {
         error_style="501",
         daynight="VideoInDayNight",
         position_abs="full",
+        event_form="A",
+        event_header_twice=True,
+        event_length_space=True,
     ),
 }

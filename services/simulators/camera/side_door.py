@@ -4,7 +4,10 @@ GET  /state                              true pose, reading, motion, the door's 
 GET  /motors                             what they can (position, speeds, accelerations) and what they did (counters)
 GET  /log                                requests: time, method, target, status, authorized
 POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand there at once
-POST /event    {"code", "action", "index"}
+POST /event    {"code", "action", "index", "data"}
+POST /stir     {"seconds"}               something moves before the lens for so long
+POST /clock    {"offset_s", "drift_ppm"} the camera's clock is wrong by so much, and gains so many us/s
+POST /card     {"in"}                    whether a memory card is in it
 POST /fail     {"n", "how"}              the next n requests: close, 401, 500 or text
 POST /drop     {}                        cuts every connection
 POST /freeze   {"on"}                    accepts, and answers nobody
@@ -56,7 +59,19 @@ def _pose(camera: CameraServer, order: dict[str, Any]) -> None:
 
 
 def _event(camera: CameraServer, order: dict[str, Any]) -> None:
-    camera.device.events.tell(str(order["code"]), str(order["action"]), int(order.get("index", 0)))
+    camera.device.events.tell(str(order["code"]), str(order["action"]), int(order.get("index", 0)), order.get("data"))
+
+
+def _stir(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.device.detector.stir(camera.clock() + float(order["seconds"]))
+
+
+def _clock(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.device.clock.set_off(camera.clock(), float(order.get("offset_s", 0)), float(order.get("drift_ppm", 0)))
+
+
+def _card(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.device.identity.card = bool(order["in"])
 
 
 def _fail(camera: CameraServer, order: dict[str, Any]) -> None:
@@ -76,6 +91,9 @@ VIEWS["/log"] = lambda camera: list(camera.log)
 ORDERS: dict[str, Order] = {
     "/pose": _pose,
     "/event": _event,
+    "/stir": _stir,
+    "/clock": _clock,
+    "/card": _card,
     "/fail": _fail,
     "/drop": lambda camera, order: camera.drop(),
     "/freeze": _freeze,
