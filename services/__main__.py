@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from services import access, client, process, topics
+from services import access, client, process, secret_store, topics
 from services.bus import Message
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
@@ -164,6 +164,33 @@ def history(item: str, limit: int = 20, config: Config = CONFIG, json: Json = Fa
             _say(f"{time}  {value}")
     if not rows:
         raise typer.Exit(1)
+
+
+@app.command(epilog="Example: apartment probe ip1 --url http://192.0.2.9 --user ros")
+def probe(
+    camera: Annotated[str, typer.Argument(help="A camera of the configuration, or with --url a name for a new one.")],
+    url: Annotated[str | None, typer.Option(help="Where a camera is that is not configured yet.")] = None,
+    user: Annotated[
+        str, typer.Option(help="Who logs in there; the password is asked, or CAMERA_<NAME>_PASSWORD.")
+    ] = "admin",
+    out_folder: Annotated[Path | None, typer.Option("--out", help="Where files go; default probe-<camera>.")] = None,
+    yes_move: Annotated[
+        bool, typer.Option("--yes-move", help="It may move; without this the terminal is asked.")
+    ] = False,
+    config: Config = CONFIG,
+    json: Json = False,
+) -> None:
+    """Meet a camera: find out what it is and how its firmware behaves, without harm; write its configuration."""
+    from services.camera.probe import command  # HTTP, for this command alone
+
+    if url is not None:
+        target = command.stranger(camera, url, user, secret_store.lookup())
+    else:
+        known = load(config, (f"camera-{camera}",)).instances
+        if f"camera-{camera}" not in known:
+            raise ConfigError([f"{config}:1: cameras: expected {camera!r} there, or its address with --url"])
+        target = command.configured(camera, known[f"camera-{camera}"].config)
+    command.run(out, target, out_folder or Path(f"probe-{camera}"), yes_move=yes_move, json_only=json)
 
 
 def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:

@@ -10,8 +10,8 @@ import difflib
 import importlib
 import os
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -262,7 +262,7 @@ def _expected(fault: Any, model: type[BaseModel]) -> str:
     last = str(fault["loc"][-1]) if fault["loc"] else ""
     if fault["type"] == "missing":
         return "expected a value, got nothing"
-    if fault["type"] == "extra_forbidden":
+    if fault["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         return _unknown(last, _keys_at(model, fault["loc"][:-1]))
     text = str(fault["msg"]).replace("Value error, ", "").replace("Input should be", "expected")
     if "password" in last or ", got " in text:
@@ -279,20 +279,20 @@ def _unknown(key: object, known: Any) -> str:
     return f"expected a known key{f' (did you mean {near[0]!r}?)' if near else ''}, got {str(key)!r}"
 
 
-def _keys_at(model: type[BaseModel], path: tuple[int | str, ...]) -> tuple[str, ...]:
-    """The keys that a nested model knows, as far as the types tell."""
+def _keys_at(model: Any, path: tuple[int | str, ...]) -> tuple[str, ...]:
+    """The keys that a nested model or dataclass knows, as far as the types tell."""
     for part in path:
-        annotation = (
-            model.model_fields[part].annotation if isinstance(part, str) and part in model.model_fields else None
-        )
-        inner = next((kind for kind in _kinds(annotation)), None)
-        if inner is not None:
-            model = inner
-    return tuple(name for name in model.model_fields if name not in INJECTED)
+        known = getattr(model, "model_fields", {})
+        model = next(_kinds(known[part].annotation if part in known else None), model)
+    return tuple(name for name in _fields(model) if name not in INJECTED)
 
 
-def _kinds(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _fields(model: Any) -> Iterable[str]:
+    return model.__dataclass_fields__ if is_dataclass(model) else model.model_fields
+
+
+def _kinds(annotation: Any) -> Iterator[Any]:
+    if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         yield annotation
     for inner in getattr(annotation, "__args__", ()):
         yield from _kinds(inner)

@@ -153,6 +153,14 @@ class Motion(Payload):
     since: str
 
 
+class Audio(Payload):
+    """`camera/<cam>/audio`: a recording is done; `file` is its name in the audio folder."""
+
+    file: str
+    seconds: float
+    bytes: int
+
+
 class ScanState(Payload):
     """`camera/<cam>/scan/state`: `progress` goes from 0 to 1."""
 

@@ -163,6 +163,9 @@ CAMERA_SNAPSHOT_GET = Topic(
     "camera/<cam>/snapshot/get", Kind.COMMAND, str, (*STEERS, "openhab"), ("camera-<cam>",), "asks for a snapshot"
 )
 CAMERA_SNAPSHOT = Topic("camera/<cam>/snapshot", Kind.BLOB, bytes, ("camera-<cam>",), (*SHOWN, "openhab"), "a JPEG")
+CAMERA_AUDIO = Topic(
+    "camera/<cam>/audio", Kind.EVENT, p.Audio, ("camera-<cam>",), (*SHOWN, "openhab"), "a recording is done"
+)
 CAMERA_STREAM = Topic(
     "camera/<cam>/stream",
     Kind.STATE,

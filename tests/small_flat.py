@@ -5,10 +5,12 @@ Not here: the whole apartment with its database, robot and home, that is `servic
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +24,7 @@ from services.client import Client, connected
 from services.config import BusSettings
 from services.peers import free_port, mosquitto, ros, running
 from services.simulated import CONFIG
+from tests.network import Network, network
 
 READY_S = 60.0
 PASSWORD = "only-simulated"
@@ -55,7 +58,7 @@ class Door:
 
 @dataclass
 class SmallFlat:
-    """A running one. `doors` by camera; `process` is the supervisor's."""
+    """A running one. `doors` by camera; `process` is the supervisor of our services, the cameras have their own."""
 
     folder: Path
     config: Path
@@ -63,7 +66,9 @@ class SmallFlat:
     process: subprocess.Popen[bytes]
     doors: dict[str, Door]
     ros: ros.Master | None = None
-    parts: ExitStack = field(default_factory=ExitStack)
+    networks: dict[str, Network] = field(default_factory=dict)
+    _broker: ExitStack = field(default_factory=ExitStack)
+    _services: ExitStack = field(default_factory=ExitStack)
 
     @property
     def bus(self) -> BusSettings:
@@ -73,14 +78,38 @@ class SmallFlat:
     def pid(self, service: str) -> int:
         """The process of a service, a child of the supervisor."""
         for entry in Path("/proc").glob("[0-9]*"):
-            try:
-                words = (entry / "cmdline").read_bytes().split(b"\\0")
-                parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-            except (OSError, ValueError):
-                continue  # it ended meanwhile
-            if parent == self.process.pid and service.encode() in words:
+            if parent_of(entry) == self.process.pid and service.encode() in words_of(entry):
                 return int(entry.name)
         raise LookupError(f"no process of {service}")
+
+    @property
+    def processes(self) -> list[int]:
+        """The supervisor, its services, and their watchdogs."""
+        parents = {int(entry.name): parent_of(entry) for entry in Path("/proc").glob("[0-9]*")}
+        family = [self.process.pid]
+        for pid in family:  # it grows while we walk through it
+            family += [child for child, parent in parents.items() if parent == pid]
+        return family
+
+    @contextmanager
+    def without_broker(self, how: signal.Signals) -> Iterator[None]:
+        """Ends the broker; at the end of the block it is started again, on the same port."""
+        os.kill(self.broker.pid, how)
+        try:
+            yield
+        finally:
+            self._broker.close()
+            self.broker = self._broker.enter_context(broker_of(self.folder, self.doors, self.broker.port))
+
+    def start_services(self) -> None:
+        """Starts them, also after they were killed, and waits until every camera is online."""
+        self._services.close()
+        names = [f"camera-{name}" for name in self.doors] + (["bridge"] if self.ros else [])
+        environment = self.ros.env if self.ros else {}
+        self.process = self._services.enter_context(_running(self.config, self.folder / "run.log", names, environment))
+        with self.client("camera/+/status") as client:
+            for name in self.doors:
+                client.payload(f"camera/{name}/status", lambda status: status.state == "online", READY_S)
 
     @contextmanager
     def client(self, *filters: str) -> Iterator[Client]:
@@ -89,10 +118,26 @@ class SmallFlat:
             yield client
 
 
+def parent_of(entry: Path) -> int:
+    """The parent of a process in /proc; 0 when it has ended."""
+    try:
+        return int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+    except (OSError, IndexError):
+        return 0
+
+
+def words_of(entry: Path) -> list[bytes]:
+    """The command line of a process in /proc."""
+    try:
+        return (entry / "cmdline").read_bytes().split(b"\0")
+    except OSError:
+        return []
+
+
 @contextmanager
-def broker_of(folder: Path, cameras: Iterable[str]) -> Iterator[mosquitto.Broker]:
+def broker_of(folder: Path, cameras: Iterable[str], port: int = 0) -> Iterator[mosquitto.Broker]:
     """A private mosquitto; who gives no name may do everything."""
-    with mosquitto.private(folder / "mosquitto", cameras, anonymous=True) as broker:
+    with mosquitto.private(folder / "mosquitto", cameras, port, anonymous=True) as broker:
         yield broker
 
 
@@ -103,39 +148,43 @@ def small_flat(
     *,
     simulator: Mapping[str, Any] | None = None,
     camera: Mapping[str, Any] | None = None,
-    port: int = 0,
+    networked: bool = False,
     with_ros: bool = False,
 ) -> Iterator[SmallFlat]:
     """Runs until the end of the block, everybody online. `simulator`, `camera`: settings of all cameras.
 
-    `port`: where the services look for the (only) camera, when that is not where it is. Missing: no mosquitto or ROS.
+    `networked`: with a network between each camera and its service, to be cut. Missing: no mosquitto or ROS.
     """
-    cameras = list(cameras)
+    doors = {name: Door(f"http://127.0.0.1:{free_port()}") for name in cameras}
     with ExitStack() as stack:
-        broker_stack = stack.enter_context(ExitStack())
-        broker = broker_stack.enter_context(broker_of(folder, cameras))
+        broker_stack, services = stack.enter_context(ExitStack()), ExitStack()
+        broker = broker_stack.enter_context(broker_of(folder, doors))
         master = stack.enter_context(ros.private(folder / "ros")) if with_ros else None
         config = Path(shutil.copytree(CONFIG, folder / "config")) / "small.yaml"
-        ports = {name: free_port() for name in cameras}
-        doors = {name: free_port() for name in cameras}
+        ports = {name: free_port() for name in doors}
+        networks = {name: stack.enter_context(network(ports[name])) for name in doors if networked}
+        near = {name: networks[name].port if networked else ports[name] for name in doors}
         sections = {
             "bus": {"port": broker.port},
             "state": str(folder / "state"),
             "home": "home.yaml",
-            "cameras": {name: {**_camera(name, port or ports[name], folder), **(camera or {})} for name in cameras},
-            "simulators": {"cameras": {
-                name: {"port": ports[name], "side_door_port": doors[name], "user": "ros", "password": PASSWORD,
-                       **(simulator or {})} for name in cameras}},
+            "cameras": {name: {**_camera(name, near[name], folder), **(camera or {})} for name in doors},
+            "simulators": {"cameras": {name: {**_simulator(ports[name], door), **(simulator or {})}
+                                       for name, door in doors.items()}},
             **({"bridge": {"rules": "bridge.yaml"}} if with_ros else {}),
         }  # fmt: skip
         config.write_text(yaml.safe_dump(sections))
-        process = stack.enter_context(_running(config, folder, master.env if master else {}))
-        found = {name: Door(f"http://127.0.0.1:{doors[name]}") for name in cameras}
-        flat = SmallFlat(folder, config, broker, process, found, master, broker_stack)
-        with flat.client("camera/+/status") as client:
-            for name in cameras:
-                client.payload(f"camera/{name}/status", lambda status: status.state == "online", READY_S)
+        names = [f"simulated-camera-{name}" for name in doors]
+        simulators = stack.enter_context(_running(config, folder / "simulators.log", names))
+        stack.enter_context(services)
+        flat = SmallFlat(folder, config, broker, simulators, doors, master, networks, broker_stack, services)
+        flat.start_services()
         yield flat
+
+
+def _simulator(port: int, door: Door) -> dict[str, Any]:
+    side = int(door.url.rpartition(":")[2])
+    return {"port": port, "side_door_port": side, "user": "ros", "password": PASSWORD}
 
 
 def _camera(name: str, port: int, folder: Path) -> dict[str, Any]:
@@ -147,11 +196,13 @@ def _camera(name: str, port: int, folder: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def _running(config: Path, folder: Path, environment: Mapping[str, str]) -> Iterator[subprocess.Popen[bytes]]:
-    command = [sys.executable, "-m", "services", "run", "--config", str(config)]
-    log = folder / "run.log"
-    path = {"PYTHONPATH": str(CONFIG.parent)}
-    with running(command, log, lambda: b"READY {" in log.read_bytes(), {**path, **environment}) as process:
+def _running(
+    config: Path, log: Path, names: Sequence[str], environment: Mapping[str, str] | None = None
+) -> Iterator[subprocess.Popen[bytes]]:
+    command = [sys.executable, "-m", "services", "run", *names, "--config", str(config)]
+    environment = {"PYTHONPATH": str(CONFIG.parent), **(environment or {})}
+    old = log.stat().st_size if log.exists() else 0
+    with running(command, log, lambda: b"READY {" in log.read_bytes()[old:], environment) as process:
         yield process
 
 
@@ -167,8 +218,3 @@ def end_orphans(pids: Iterable[int]) -> None:
     """Waits until processes whose parent was killed have ended by themselves."""
     for pid in pids:
         peers.wait_until(lambda pid=pid: not alive(pid), f"the end of {pid}", 15.0)  # type: ignore[misc]
-
-
-def log_of(flat: SmallFlat) -> str:
-    """What the services logged."""
-    return (flat.folder / "run.log").read_text(errors="replace")

@@ -26,6 +26,7 @@ from tests.camera import trials as camera_trials
 from tests.small_flat import SmallFlat, small_flat
 
 LONGEST_S = 600.0
+HANGING = ("a", "b", "c", "d")
 Turn = Callable[[random.Random], float]
 
 
@@ -42,10 +43,10 @@ def real(trial: Callable[[Simulated, random.Random], float]) -> Iterator[Turn]:
 
 @contextmanager
 def cameras(
-    trial: Callable[[SmallFlat, random.Random], float], names: tuple[str, ...] = ("ip1",), **simulator: Any
+    trial: Callable[[SmallFlat, random.Random], float], names: tuple[str, ...] = ("ip1",), **options: Any
 ) -> Iterator[Turn]:
     """Turns with simulated cameras and a broker alone, one apartment for all."""
-    with tempfile.TemporaryDirectory() as name, small_flat(Path(name), names, simulator=simulator) as flat:
+    with tempfile.TemporaryDirectory() as name, small_flat(Path(name), names, **options) as flat:
         yield lambda rng: trial(flat, rng)
 
 
@@ -91,9 +92,19 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
         "bad messages counted",
     ),
     "camera-hangs": (
-        lambda: cameras(lambda flat, rng: camera_trials.hang(flat, "d"), ("a", "b", "c", "d"), latency_s=0.1),
+        lambda: cameras(lambda flat, rng: camera_trials.hang(flat, "d"), HANGING, simulator={"latency_s": 0.1}),
         10,
         "x the time of an order",
+    ),
+    "camera-kills": (
+        lambda: cameras(lambda flat, rng: rng.choice(camera_trials.KILLS)(flat)),
+        20,
+        "s until the motor stands still",
+    ),
+    "camera-cuts": (
+        lambda: cameras(lambda flat, rng: camera_trials.cut_network(flat, seconds=rng.uniform(0, 5)), networked=True),
+        20,
+        "s until the stop arrives",
     ),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),

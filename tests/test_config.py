@@ -166,3 +166,17 @@ def test_secrets_come_from_environment_then_credential_then_file(tmp_path: Path)
                    "APARTMENT_SECRETS": str(tmp_path / "secrets.yaml")}  # fmt: skip
     find = secret_store.lookup(environment)
     assert [find(name) for name in "ABCD"] == ["environment", "credential", "file", None]
+
+
+def test_a_switch_of_the_simulated_firmware_can_be_set_and_a_wrong_one_is_told_with_its_line(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, "    camera: ip1\n", "    camera: ip1\n    switches:\n      nonce: flaky\n")
+    assert load(file, deep=True).instances["simulated-camera"].config.model_dump()["switches"]["nonce"] == "flaky"
+    spoil(file, "      nonce: flaky\n", "      nonces: flaky\n      status_form: d\n")
+    told = faults(file)
+    assert any(
+        fault.startswith(f"{file}:{line + 2}: simulators.camera.switches.nonces: expected a known key")
+        and "did you mean 'nonce'?" in fault
+        for fault in told
+    ), told
+    assert any(f"{file}:{line + 3}: simulators.camera.switches.status_form: expected 'a'" in fault for fault in told)

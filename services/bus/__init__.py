@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
 
 WAKE_TOPIC = "/bus/wake"  # posted to end a wait; no service sees it
+LOST_TOPIC = "/bus/lost"  # posted when the connection breaks, to a service that has subscribed to it
 
 
 class Message(NamedTuple):
@@ -55,7 +56,7 @@ class Bus(Protocol):
         ...
 
     def subscribe(self, filters: Sequence[str]) -> None:
-        """Asks for everything that matches; restored after every reconnect."""
+        """Asks for everything that matches; restored after every reconnect. `/bus/lost` is the bus's own word."""
 
     def publish(self, message: Message) -> None:
         """Sends without waiting."""

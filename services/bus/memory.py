@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 
-from services.bus import WAKE_TOPIC, Message, topic_matches
+from services.bus import LOST_TOPIC, WAKE_TOPIC, Message, topic_matches
 from services.bus.outbox import Outbox
 
 WINDOW = 1000
@@ -92,6 +92,8 @@ class MemoryBus:
 
     def lose(self) -> None:
         """The connection breaks without a word; the hub says our last will."""
+        if self.connected and LOST_TOPIC in self._filters:
+            self.post(Message(LOST_TOPIC))
         self.connected = False
         if self._will is not None and self.hub.up:
             self.hub.deliver(self._will)

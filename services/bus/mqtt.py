@@ -20,7 +20,7 @@ import paho.mqtt.client as paho
 from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.reasoncodes import ReasonCode
 
-from services.bus import WAKE_TOPIC, Message, connection, topic_matches
+from services.bus import LOST_TOPIC, WAKE_TOPIC, Message, connection, topic_matches
 from services.bus.connection import CONNECT_TIMEOUT_S, WINDOW, Address
 from services.bus.outbox import Outbox
 
@@ -261,15 +261,18 @@ class MqttBus:
         self._inbox.put(WAKE)
 
     def _subscribe(self, client: paho.Client, filters: Sequence[str]) -> None:
-        if filters:
-            client.subscribe([(wanted, 1) for wanted in filters])
+        wanted = [(one, 1) for one in filters if not one.startswith("/")]
+        if wanted:
+            client.subscribe(wanted)
 
     def _on_disconnect(
         self, client: paho.Client, _data: Any, _flags: Any, reason: ReasonCode, _properties: Any
     ) -> None:
-        self._up = 0
+        was_up, self._up = self._up, 0
         if self._client is client and not self._closing.is_set():
             self._tell(f"connection to {self.address.host}:{self.address.port} lost: {reason}")
+            if was_up and LOST_TOPIC in self._filters:
+                self.post(Message(LOST_TOPIC))
         self._lost.set()
 
     def _on_message(self, _client: paho.Client, _data: Any, message: paho.MQTTMessage) -> None:

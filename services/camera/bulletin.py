@@ -13,6 +13,8 @@ from services.camera.device import same
 from services.camera.health import Health
 from services.camera.places import Places
 from services.camera.requests import Identity, Reading, Refused
+from services.camera.upkeep import Facts
+from services.camera.video.channel import Channel
 from services.errors import ConfigError
 from services.payloads import Diagnostic, Position, Stream
 
@@ -32,11 +34,13 @@ class Bulletin:
         self.places = places
         self.publish = publish
         self.diagnostics = True  # whether the health is said
+        self.facts = Facts()
         self.due = 0.0
         self.reading: Reading | None = None
         self.turning = False
         self.identity: Identity | None = None
-        self._read_at = 0.0
+        self.video: Channel | None = None
+        self._read_at = self._turned_at = 0.0
         self._said: dict[topics.Topic, BaseModel] = {}
         self._position_at = 0.0
 
@@ -44,6 +48,8 @@ class Bulletin:
         """A new reading from the camera."""
         changed = self.reading is not None and not same(self.reading, reading)
         self.turning = changed or reading.moving is True
+        if self.turning or self.reading is None:
+            self._turned_at = at
         self.reading, self._read_at = reading, at
 
     def known(self) -> Reading:
@@ -55,6 +61,10 @@ class Bulletin:
     def at_rest(self, now: float, age_s: float) -> Reading | None:
         """The newest reading when it is of a camera at rest and not older than that."""
         return self.reading if not self.turning and now - self._read_at <= age_s else None
+
+    def still_for(self, now: float) -> float:
+        """How many seconds the camera has stood still, as far as its readings tell."""
+        return now - self._turned_at
 
     def position(self) -> Position | None:
         """The newest reading as it is published."""
@@ -74,11 +84,11 @@ class Bulletin:
         """Publishes what has changed, and the health once a second."""
         self.say(topics.CAMERA_STATUS, self.health.status)
         self._say_position(now)
+        self.say(topics.CAMERA_STREAM, self.video.state if self.video else Stream(rtsp=False, mjpeg=False, url=""))
         if now >= self.due:
             self.due = now + EVERY_S
             self._reload()
             self.say(topics.CAMERA_PLACES, self.places.payload)
-            self.say(topics.CAMERA_STREAM, Stream(rtsp=False, mjpeg=False, url=""))
             if self.diagnostics:
                 component = f"camera/{self.camera}"
                 self.publish(topics.DIAGNOSTICS.message(self._diagnostic(counters), component=component))
@@ -104,11 +114,15 @@ class Bulletin:
             "http_latency_ms": f"{1000 * self.health.latency:.0f}",
             "model": identity.model,
             "firmware": identity.version,
+            **(self.video.values() if self.video else {}),
             **{name: str(count) for name, count in counters.items()},
+            **self.facts.values,
         }
+        seen = self.video.complaint() if self.video else ""
+        complaints = [*filter(None, [seen]), *self.facts.complaints.values()]
         return Diagnostic(
-            level=LEVELS.get(self.health.state, 2),
-            message=": ".join(part for part in (self.health.state, self.health.reason) if part),
+            level=max(LEVELS.get(self.health.state, 2), 1 if complaints else 0),
+            message="; ".join([": ".join(filter(None, (self.health.state, self.health.reason))), *complaints]),
             values=values,
             hardware_id=identity.serial or self.camera,
         )

@@ -1,14 +1,14 @@
-"""The orders that do not turn the camera, as plans: places, targets, picture options, reboot, snapshots."""
+"""The orders that do not turn the camera, as plans: places, targets, picture options, reboot."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, cast
 
-from services import topics
-from services.camera import orders
+from services.camera import commands, orders
 from services.camera.bulletin import Bulletin
 from services.camera.health import Health
+from services.camera.looks import Looks
 from services.camera.orders import Command
 from services.camera.places import Places
 from services.camera.plan import Plan, ask, attempt, wait
@@ -21,14 +21,15 @@ from services.camera.requests import (
     Refused,
     SavePreset,
     SetPicture,
-    Snapshot,
     Status,
 )
 from services.camera.scan.scanner import Scanner
-from services.camera.video import pictures
+from services.camera.sound.takes import Takes
+from services.camera.video.feed import Feed
 from services.payloads import Place
 
-WITHOUT_CAMERA = orders.ShowScan | orders.Targets | orders.Routine  # these are taken while it is away too
+# These are taken while it is away too; a stream can be switched off then.
+WITHOUT_CAMERA = orders.ShowScan | orders.Targets | orders.Routine | orders.Broadcast
 DOWN_S = 20.0  # a camera that still answers so long after the order does not reboot (or was too quick to be seen)
 UP_S = 180.0  # 40 to 105 s were seen
 
@@ -36,11 +37,15 @@ UP_S = 180.0  # 40 to 105 s were seen
 class Chores:
     """Makes the plan for each of these orders."""
 
-    def __init__(self, places: Places, scanner: Scanner, health: Health, bulletin: Bulletin) -> None:
+    def __init__(
+        self, places: Places, scanner: Scanner, health: Health, bulletin: Bulletin, feed: Feed, takes: Takes
+    ) -> None:
         self.places = places
         self.scanner = scanner
         self.health = health
         self.bulletin = bulletin
+        self.looks = Looks(bulletin.facts)
+        self.takes = takes
         self._plans: dict[type, Callable[[Any, float], Plan[None]]] = {
             orders.SavePlace: self._save,
             orders.RemovePlace: self._remove,
@@ -48,21 +53,17 @@ class Chores:
             orders.Targets: self._targets,
             orders.Routine: self._routine,
             orders.Options: self._options,
+            commands.VideoMode: lambda order, now: self.looks.mode(order),
+            commands.HideLens: lambda order, now: self.looks.privacy(order),
+            commands.RecordSound: lambda order, now: self.takes.record(order, now),
+            commands.PlaySound: lambda order, now: self.takes.play(order, now),
+            orders.Broadcast: feed.switch,
             orders.Restart: self._restart,
         }
 
     def plan(self, command: Command, now: float) -> Plan[None]:
         """The plan; it raises Refused or another DeviceError when the order cannot be carried out."""
         return self._plans[type(command)](command, now)
-
-    def snapshot(self) -> Plan[None]:
-        """Takes a picture and publishes it upright."""
-        reply = yield from ask(Snapshot())
-        jpeg, picture = cast(bytes, reply.result), self.scanner.picture
-        image = pictures.decode(jpeg)
-        turned = pictures.upright(image, flip=picture.flip, mirror=picture.mirror, kind=self.scanner.kind)
-        data = jpeg if turned is image else pictures.encode(turned)
-        self.bulletin.publish(topics.CAMERA_SNAPSHOT.message(data, cam=self.bulletin.camera))
 
     def _save(self, order: orders.SavePlace, now: float) -> Plan[None]:
         if self.bulletin.turning:

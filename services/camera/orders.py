@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from services.camera.commands import HideLens, PlaySound, RecordSound, VideoMode
 from services.camera.places import name_of
-from services.camera.requests import Direction, Mode, Refused, SetPicture
+from services.camera.requests import Direction, Refused, SetPicture
 from services.payloads import Who
 
 RANKS: dict[Who, int] = {"scan": 0, "mission": 1, "human": 2}
@@ -18,15 +19,7 @@ LONGEST_S = 30.0  # of one Move order: it can be prolonged
 DIRECTIONS = {
     direction.name.replace("_", "").lower(): direction for direction in Direction if not direction.name.startswith("Z")
 }
-MODES: dict[str, Mode] = {"color": "color", "bw": "bw", "auto": "auto"}
 YES, NO = ("true", "on", "1"), ("false", "off", "0")
-NOT_AVAILABLE = {
-    "RTSP": "this version takes its pictures as snapshots",
-    "MJPEG": "this version takes its pictures as snapshots",
-    "AudioRec": "this version has no audio",
-    "AudioPlay": "this version has no audio",
-    "Privacy": "this version has no privacy mode",
-}
 
 
 @dataclass(frozen=True)
@@ -116,12 +109,21 @@ class Options:
 
 
 @dataclass(frozen=True)
+class Broadcast:
+    """Switch a stream; None leaves as it is."""
+
+    rtsp: bool | None = None
+    mjpeg: bool | None = None
+
+
+@dataclass(frozen=True)
 class Restart:
     """Reboot the camera."""
 
 
 Motor = GotoPlace | LookAt | MoveBy | ScanFor
-Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Options | Restart
+Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Broadcast | Restart  # all but its motors
+Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Itself
 
 
 def read(key: str, value: Any) -> Command:
@@ -230,26 +232,10 @@ def _routine(value: Any) -> Command:
     return Routine(None if isinstance(value, str) and value.strip().lower() == "auto" else _names(value))
 
 
-def _mode(value: Any) -> Command:
-    word = _text(value).lower()
-    if word == "scan":
-        raise ValueError("not available: this version cannot set the contrast; use bw")
-    if word not in MODES:
-        raise ValueError(f"expected color, bw or auto, got {word[:80]!r}")
-    return Options(SetPicture(mode=MODES[word]))
-
-
 def _restart(value: Any) -> Command:
     if not _flag(value):
         raise ValueError("expected True: a reboot cannot be taken back")
     return Restart()
-
-
-def _refuse(reason: str) -> Callable[[Any], Command]:
-    def refuse(value: Any) -> Command:
-        raise ValueError(f"not available: {reason}")
-
-    return refuse
 
 
 READERS: dict[str, Callable[[Any], Command]] = {
@@ -264,11 +250,15 @@ READERS: dict[str, Callable[[Any], Command]] = {
     "AddTarget": lambda value: Targets("add", _markers(value)),
     "RemoveTarget": lambda value: Targets("remove", _markers(value)),
     "SetRoutine": _routine,
+    "RTSP": lambda value: Broadcast(rtsp=_flag(value)),
+    "MJPEG": lambda value: Broadcast(mjpeg=_flag(value)),
     "Mirror": lambda value: Options(SetPicture(mirror=_flag(value))),
     "Flip": lambda value: Options(SetPicture(flip=_flag(value))),
-    "VideoMode": _mode,
+    "VideoMode": lambda value: VideoMode.read(_text(value)),
+    "Privacy": lambda value: HideLens(_flag(value)),
+    "AudioRec": lambda value: RecordSound.read(_text(value)),
+    "AudioPlay": lambda value: PlaySound.read(_text(value)),
     "Reboot": _restart,
-    **{key: _refuse(reason) for key, reason in NOT_AVAILABLE.items()},
 }
 KEYS = {name.lower(): (name, reader) for name, reader in READERS.items()}
 

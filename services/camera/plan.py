@@ -64,6 +64,7 @@ class Stage:
 
     def __init__(self, submit: Callable[[Request, int], None]) -> None:
         self.submit = submit
+        self.asked: set[int] = set()  # tickets of requests that have no answer yet, dropped plans' too
         self._tickets = itertools.count(1)
         self._runs: list[Run] = []
 
@@ -83,6 +84,7 @@ class Stage:
 
     def reply(self, reply: Reply, now: float) -> None:
         """Hands a reply to the plan that asked; nobody's when that was dropped."""
+        self.asked.discard(reply.ticket)
         for run in self._runs:
             if run.ticket == reply.ticket:
                 self._advance(run, reply, now)
@@ -117,6 +119,7 @@ class Stage:
             run.until = step.at
         else:
             run.ticket = next(self._tickets)
+            self.asked.add(run.ticket)
             self.submit(step, run.ticket)
 
     def _end(self, run: Run, now: float) -> None:

@@ -6,13 +6,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from services import document
+from services.camera.address import Address
+from services.camera.alarm.listener import Listener
 from services.camera.device import Device
 from services.camera.places import Places
 from services.camera.scan.analysis import Pool
 from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
-from services.camera.watchdog import Watchdog, connector
+from services.camera.sound.desk import Desk
+from services.camera.video.channel import Channel
+from services.camera.watchdog import Watchdog, brand, connector
 from services.camera.web.gate import Gate
 from services.errors import ConfigError
 from services.runner import Post
@@ -27,15 +31,30 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     watchdog = Watchdog(config.brand, address)
     gate = Gate(config.login_retry_s)
     device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell)
+    made_sound = getattr(brand(config.brand), "sound", None)
+    sender = Desk(device, made_sound(address, gate) if made_sound else None, post)
+    channel = Channel(config.name, config.stream, address, config.kind, post, gate)
+    listener = _listener(config, address, gate, post)
     try:
-        service = CameraService(config, device, lambda: Pool(post, config.workers), view)
+        service = CameraService(config, sender, lambda: Pool(post, config.workers), view, channel)
         try:
             yield service
         finally:
             service.close()
     finally:
-        device.close()
+        if listener is not None:
+            listener.close()
+        sender.close()
         watchdog.close()
+        channel.close()
+
+
+def _listener(config: Config, address: Address, gate: Gate, post: Post) -> Listener | None:
+    """The thread that hears the camera's alarms; None when they are switched off, or the brand has none."""
+    ear = getattr(brand(config.brand), "ear", None)
+    if ear is None or not config.alarm:
+        return None
+    return Listener(config.name, ear(address, gate, config.motion.codes, config.motion.heartbeat_s), post)
 
 
 def check(config: Config) -> None:

@@ -140,6 +140,14 @@ class SetPicture:
 
 
 @dataclass(frozen=True)
+class FindStream:
+    """Where the moving picture is; the answer is a StreamAddress, or None when the camera has none."""
+
+    source: Literal["main", "sub"]
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
 class Identify:
     """Who are you; the answer is an Identity."""
 
@@ -149,6 +157,12 @@ class Identify:
 @dataclass(frozen=True)
 class Reboot:
     """Start again."""
+
+    rank = Rank.CONFIG
+
+
+class Errand:
+    """Base of the requests about the device itself (`errands.py`); a brand may refuse any of them."""
 
     rank = Rank.CONFIG
 
@@ -163,8 +177,10 @@ Request = (
     | Snapshot
     | GetPicture
     | SetPicture
+    | FindStream
     | Identify
     | Reboot
+    | Errand
 )
 
 
@@ -194,6 +210,23 @@ class Identity:
     model: str
     serial: str
     version: str
+
+
+@dataclass(frozen=True)
+class StreamAddress:
+    """Addresses of a camera's moving picture, never with a password in them; `mjpeg` is a path of its HTTP server."""
+
+    rtsp: str | None
+    mjpeg: str | None = None
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that the camera noticed by itself: `action` Start, Stop, Pulse or State; no code: it is alive."""
+
+    code: str
+    action: str
+    index: int = 0
 
 
 @dataclass(frozen=True)

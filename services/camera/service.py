@@ -9,15 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from services import topics
-from services.bus import Message
+from services.bus import LOST_TOPIC, Message
 from services.camera import answers as life
 from services.camera import orders
+from services.camera.alarm.listener import HEARD, Heard
+from services.camera.alarm.motion import MotionWatch
 from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
 from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.device import REPLY, Sender
 from services.camera.discovery import Discovery
-from services.camera.health import Health
+from services.camera.health import IDLE_S, Health
 from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
@@ -30,17 +32,29 @@ from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
 from services.camera.scan.sightings import Eye
 from services.camera.settings import Config
+from services.camera.sound.takes import Takes
+from services.camera.upkeep import Upkeep
+from services.camera.video.channel import ASKED, Channel
+from services.camera.video.feed import Feed
 from services.errors import BadMessage
 from services.payloads import Order, OrderState, PositionSet
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
-FRESH_S = 2.0  # a reading as old as this still tells where a camera at rest looks
+STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
+FRESH_S = 3.0  # a reading as old as this still tells where a camera at rest looks
 
 
 class CameraService:
     """A Service (`runner.py`). `analyst` makes the one that looks at frames, a new one for each scan."""
 
-    def __init__(self, config: Config, sender: Sender, analyst: Callable[[], Analyst], eye: Eye) -> None:
+    def __init__(
+        self,
+        config: Config,
+        sender: Sender,
+        analyst: Callable[[], Analyst],
+        eye: Eye,
+        channel: Channel | None = None,
+    ) -> None:
         self.config = config
         self.subscribes = tuple(
             topic.filter_for(cam=config.name)
@@ -52,6 +66,7 @@ class CameraService:
                 topics.HOMEASSISTANT_STATUS,
             )
         )
+        self.subscribes += (LOST_TOPIC,)
         self.due: float | None = 0.0
         self.counters: dict[str, int] = {"requests": 0, "failed_requests": 0, "frames": 0}
         self._out: list[Message] = []
@@ -67,15 +82,26 @@ class CameraService:
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
         self.scanner = Scanner(config, self.skill, eye, analyst, self.bulletin, self.places)
-        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin)
+        self.bulletin.video = channel
+        self.feed = Feed(config, self.health, channel, publish)
+        takes = Takes(config.name, config.folder / config.audio, publish)
+        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes)
+        self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=config.alarm)
+        self.upkeep = Upkeep(config.name, config.clock, self.bulletin.facts, self._has_time)
         self._polling = False
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
         """Takes a reply, an analysed frame, or an order."""
         if message.topic == REPLY and isinstance(message.value, Reply):
             self._reply(message.value, now)
+        elif message.topic == HEARD and isinstance(message.value, Heard):
+            self.motion.take(message.value)
         elif message.topic == ANALYSED and isinstance(message.value, Analysed):
             self.scanner.take(message.value)
+        elif message.topic == LOST_TOPIC:  # nobody could end a motion any more
+            self.motors.give_up("the connection to the broker was lost", now)
+        elif message.topic == ASKED:
+            self.stage.begin(self.feed.shown(), now, _nobody)
         else:
             try:
                 read = topics.read(message, now)
@@ -102,16 +128,34 @@ class CameraService:
         """Wakes the plans, and publishes what has changed."""
         if not self._polling:
             self._polling = True
-            self.stage.begin(self._poll(now), now, _nobody)
+            for plan in (self._poll(now), self.feed.run(now), self.feed.every_so_often(now), self.upkeep.plan(now)):
+                self.stage.begin(plan, now, _nobody)
         self.stage.tick(now)
         self.motors.tick(now)
         self.health.moving = self.motors.busy
         self.counters["frames"] = self.scanner.frames
         self.scanner.tick(now)
+        self._watch_motion(now)
         self.bulletin.tick(now, self.counters)
         self.discovery.tick(self.bulletin.identity, self.places.named)
         self.due = min(time for time in (self.bulletin.due, self.stage.due) if time is not None)
         return self._flush()
+
+    def _watch_motion(self, now: float) -> None:
+        turning = self.motors.busy or self.bulletin.turning
+        motion = self.motion.tick(now, turning=turning, online=self.health.online)
+        if motion is not None:
+            self.bulletin.say(topics.CAMERA_MOTION, motion)
+        self.bulletin.facts.values["alarm"] = self.motion.fact
+        self.bulletin.facts.complain("alarm", f"motion alarm {self.motion.fact}" if self.motion.trouble else "")
+        self.bulletin.facts.values["request_queue"] = str(len(self.stage.asked))
+
+    def _has_time(self) -> bool:
+        return self.health.online and not self.health.rebooting and not self.motors.busy
+
+    def _begin(self, plan: Plan[None], now: float) -> None:
+        """A plan whose end nobody waits for."""
+        self.stage.begin(plan, now, _nobody)
 
     def close(self) -> None:
         """Ends the processes of a scan that is under way."""
@@ -138,6 +182,7 @@ class CameraService:
     def _take_picture(self, picture: Picture) -> None:
         """The motors follow the picture: when its options changed, which way they turn is to be seen anew."""
         old, self.scanner.picture = self.scanner.picture, picture
+        self.feed.turned(picture)
         if (picture.flip, picture.mirror) != (old.flip, old.mirror):
             self.skill.forget_senses(flip=picture.flip, mirror=picture.mirror)
 
@@ -147,12 +192,16 @@ class CameraService:
         while True:
             now = yield from wait(max(now + 0.05, self.health.next_poll))
             if self.motors.busy or self.health.rebooting:
+                met = met and not self.health.rebooting
                 now = yield from wait(now + BUSY_S)
                 continue
             now = (yield from attempt(Status())).received
+            if self.health.online and self.bulletin.still_for(now) > STIRRED_S:
+                self.health.next_poll += REST_S - IDLE_S
             if self.health.online and not met:
                 yield from attempt(Identify())
                 now = (yield from attempt(GetPicture())).received
+                self.upkeep.met()
                 if self.bulletin.turning:
                     self.motors.make_sure(now)
             met = self.health.online
@@ -160,7 +209,7 @@ class CameraService:
     def _read(self, read: topics.Read, now: float) -> None:
         payload = read.payload
         if read.topic is topics.CAMERA_SNAPSHOT_GET:
-            self.stage.begin(self.chores.snapshot(), now, _nobody)
+            self.stage.begin(self.feed.published(), now, _nobody)
         elif read.topic in (topics.HOMEASSISTANT_ENTITY, topics.HOMEASSISTANT_STATUS):
             self.discovery.hear(read)
         elif isinstance(payload, PositionSet):
@@ -210,6 +259,8 @@ class CameraService:
             self._goal(command)
         elif isinstance(command, orders.RemovePlace):
             self.places.get(command.place)
+        elif isinstance(command, orders.Broadcast):
+            self.feed.check(command)
         elif isinstance(command, ScanFor):
             self.scanner.check(command)
 

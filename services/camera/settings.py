@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any, Literal
+from zoneinfo import available_timezones
 
 from pydantic import Field, SecretStr, field_validator, model_validator
 
 from services.camera.address import Address
 from services.camera.ptz.goal import Limits
+from services.camera.video.settings import SnapshotSettings, StreamSettings
 from services.section import Section
 from services.vision.frames import Mount
 
@@ -32,6 +34,30 @@ class PictureOptions(Section):
 
     flip: bool = True
     mirror: bool = True
+
+
+class MotionSettings(Section):
+    """What counts as motion, and for how long."""
+
+    codes: tuple[str, ...] = ("VideoMotion",)  # the camera's words; SmartMotionHuman and others where it has them
+    hold_s: float = Field(default=15.0, gt=0, le=600)
+    heartbeat_s: int = Field(default=4, ge=1, le=60)  # three missed ones are noticed within 15 s
+
+
+class ClockSettings(Section):
+    """The camera's clock shows local time; its own time zone is an index that nobody can read."""
+
+    set: bool = True  # when it is wrong by more than `drift_s`
+    drift_s: float = Field(default=5.0, ge=2)
+    every_s: float = Field(default=3600.0, ge=1)  # between two looks at it
+    timezone: str | None = None  # such as Europe/Paris; None: this computer's
+
+    @field_validator("timezone")
+    @classmethod
+    def is_a_zone(cls, name: str | None) -> str | None:
+        if name is not None and name not in available_timezones():
+            raise ValueError(f"expected a time zone such as Europe/Paris, got {name[:80]!r}")
+        return name
 
 
 class MountSettings(Section):
@@ -70,6 +96,9 @@ class Config(Section):
     targets: tuple[int, ...] = ()
     diagnostics: bool = True  # say how it fares, once a second
     alarm: bool = True  # listen to the camera's own motion alarm
+    motion: MotionSettings = MotionSettings()
+    clock: ClockSettings = ClockSettings()
+    audio: Path = Path("audio")  # folder of recordings, and of what can be played
     discovery: bool = False  # tell Home Assistant and openHAB what there is (`homeassistant/#`)
     picture: PictureOptions = PictureOptions()
     pan_dead_arc: Pair = (179.0, 186.0)  # readings that the camera cannot reach, degrees
@@ -81,6 +110,9 @@ class Config(Section):
     settle_s: float = Field(default=0.6, ge=0, le=10)  # from rest to the first frame: the picture's own delay
     stop_early: bool = True  # a scan ends when every target was seen where it shows best
     move_timeout_s: float = Field(default=60.0, gt=1, le=600)
+    stream: StreamSettings = StreamSettings()
+    snapshot: SnapshotSettings = SnapshotSettings()
+    scan_pictures: Literal["snapshot", "stream"] = "snapshot"  # what a scan looks at, where a stream is on
     workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
 
     @model_validator(mode="before")
@@ -124,3 +156,8 @@ class Config(Section):
     def limits(self) -> Limits:
         """Where this camera can look."""
         return Limits(self.pan_dead_arc, self.tilt_range, self.zoom_range)
+
+    @property
+    def kind(self) -> Literal["ceiling", "shelf"]:
+        """How the camera is mounted."""
+        return self.mount.kind if self.mount else "ceiling"

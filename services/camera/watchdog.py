@@ -13,8 +13,10 @@ import logging
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable
+from types import ModuleType
 from typing import Protocol, cast
 
 from pydantic import SecretStr
@@ -55,6 +57,7 @@ class Watchdog:
             self.process.wait(END_S)
         except (OSError, subprocess.TimeoutExpired) as error:
             log.warning("the watchdog is still at work: %s", error)
+            threading.Thread(target=self.process.wait, name="watchdog's end", daemon=True).start()  # no zombie stays
 
     def _write(self, line: str) -> None:
         assert self.process.stdin is not None
@@ -73,9 +76,14 @@ class Connect(Protocol):
         ...
 
 
-def connector(brand: str, address: Address, gate: Gate) -> Callable[[], Camera]:
+def brand(name: str) -> ModuleType:
+    """The module of that brand."""
+    return importlib.import_module(f"services.camera.brands.{name}")
+
+
+def connector(name: str, address: Address, gate: Gate) -> Callable[[], Camera]:
     """Makes connections to a camera of that brand; the first one is for control."""
-    connect = cast(Connect, importlib.import_module(f"services.camera.brands.{brand}").connect)
+    connect = cast(Connect, brand(name).connect)
     number = itertools.count()
     return lambda: connect(address, gate, urgent=next(number) == 0)
 

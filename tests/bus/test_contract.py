@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from services import peers
-from services.bus import Message, topic_matches
+from services.bus import LOST_TOPIC, Message, topic_matches
 from services.bus.memory import Hub, MemoryBus
 from services.bus.mqtt import Address, MqttBus
 from services.peers import embedded, free_port, mosquitto
@@ -192,6 +192,19 @@ def test_posting_wakes_the_receiver_from_any_thread(kit: Kit) -> None:
     bus = kit.client("one")
     bus.post(Message("/local", value={"any": "object"}))
     assert take(bus, 1)[0].value == {"any": "object"}
+
+
+def test_who_wants_to_know_is_told_once_that_the_connection_broke(kit: Kit) -> None:
+    curious, other = kit.client("curious"), kit.client("other")
+    curious.subscribe([LOST_TOPIC, "home/Lamp/state"])
+    other.subscribe(["home/Lamp/state"])
+    kit.down()
+    assert [one.topic for one in take(curious, 1)] == [LOST_TOPIC]
+    kit.back()
+    until(lambda: curious.connected and other.connected, curious, other)
+    kit.client("sender").publish(Message("home/Lamp/state", b"ON", retain=True))
+    assert [one.topic for one in take(curious, 1)] == ["home/Lamp/state"]
+    assert [one.topic for one in take(other, 1)] == ["home/Lamp/state"]
 
 
 def test_a_connection_says_birth_and_a_clean_end_says_the_will(kit: Kit) -> None:

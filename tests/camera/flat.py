@@ -13,6 +13,7 @@ import numpy as np
 from services.bus import Message
 from services.camera.device import REPLY
 from services.camera.requests import (
+    Errand,
     GetPicture,
     Identify,
     Identity,
@@ -20,6 +21,7 @@ from services.camera.requests import (
     Rank,
     Reading,
     Reboot,
+    Refused,
     Reply,
     Request,
     SetPicture,
@@ -49,6 +51,8 @@ class VirtualCamera:
         self.clock = clock
         self.picture = Picture(True, motors.mirror, "color")
         self.away: DeviceError | None = None
+        self.errands: list[Errand] = []
+        self.answers: dict[type[Errand], Callable[[Any], object]] = {}
         self.waiting: list[tuple[Request, int]] = []
         self.flying: list[tuple[float, float, Request, int]] = []  # when it is answered, when sent
         self.closed = False
@@ -106,6 +110,10 @@ class VirtualCamera:
                 return Identity("IP3M-941W", "AMC0000000000001", "2.420"), None
             case Reboot():
                 return None, None
+            case Errand():
+                self.errands.append(request)
+                answer = self.answers.get(type(request), lambda one: Refused("no such thing here"))(request)
+                return (None, answer) if isinstance(answer, DeviceError) else (answer, None)
             case _:
                 return self.motors.answer(request)
 

@@ -5,14 +5,19 @@ Each does something bad, asserts what is promised about it, and returns the figu
 
 from __future__ import annotations
 
+import os
+import signal
 import time
 from statistics import median
 from typing import Any
 
+from services import peers
 from services.client import Client
-from tests.small_flat import SmallFlat
+from tests.small_flat import Door, SmallFlat, end_orphans
 
 NOTICED_S = 15.0  # a fault shows in the status within this
+STOPPED_S = 1.5  # after whatever died: the motor stands still
+REACHED_S = 1.0  # after the network is back: the stop reaches the camera
 TURNS = 9  # orders per camera, before and while
 
 
@@ -59,3 +64,106 @@ def newest(bus: Client, topic: str) -> bytes:
     """The newest payload that was heard there."""
     said: list[Any] = [message.payload for message in bus.seen if message.topic == topic]
     return bytes(said[-1]) if said else b""
+
+
+def kill_service(flat: SmallFlat, *, camera: str = "ip1") -> float:
+    """kill -9 of the camera's service in the middle of a move; seconds until the motor stands still."""
+    door, service = flat.doors[camera], flat.pid(f"camera-{camera}")
+    with flat.client(f"service/camera-{camera}/status", f"camera/{camera}/#") as bus:
+        turn(bus, flat, camera)
+        os.kill(service, signal.SIGKILL)
+        seconds = until_still(door)
+        bus.until(lambda message: message.payload == b"offline", 10.0, "the last will")
+        bus.forget()
+        bus.payload(f"service/camera-{camera}/status", lambda text: text == "online", 20.0)
+        rests(door)
+        assert bus.order(camera, "Flip", "True").state == "done"
+    return seconds
+
+
+def kill_supervisor(flat: SmallFlat, *, camera: str = "ip1") -> float:
+    """kill -9 of the supervisor in the middle of a move; seconds until the motor stands still. Nobody is left over."""
+    door, family = flat.doors[camera], flat.processes
+    assert len(family) > 2, "the supervisor, a service and a watchdog"
+    with flat.client(f"camera/{camera}/#") as bus:
+        turn(bus, flat, camera)
+        os.kill(flat.process.pid, signal.SIGKILL)
+        seconds = until_still(door)
+        end_orphans(family)
+        rests(door)
+    flat.start_services()
+    return seconds
+
+
+def kill_broker(flat: SmallFlat, *, camera: str = "ip1") -> float:
+    """kill -9 of the broker in the middle of a move; seconds until the motor stands still. Then all is as before."""
+    door = flat.doors[camera]
+    with flat.client(f"camera/{camera}/#") as bus:
+        turn(bus, flat, camera)
+    with flat.without_broker(signal.SIGKILL):
+        seconds = until_still(door)
+        rests(door)
+    with flat.client(f"camera/{camera}/#") as bus:
+        bus.payload(f"camera/{camera}/status", lambda status: status.state == "online", 20.0)
+        assert bus.order(camera, "Flip", "True").state == "done"
+    return seconds
+
+
+def cut_network(flat: SmallFlat, *, camera: str = "ip1", seconds: float = 0.0) -> float:
+    """The network goes in the middle of a move, and comes back `seconds` after that was noticed.
+
+    The camera turns on; the stop is the first that reaches it. Seconds from the return until then.
+    """
+    door, net = flat.doors[camera], flat.networks[camera]
+    with flat.client(f"camera/{camera}/#") as bus:
+        turn(bus, flat, camera, "Left 2 6")
+        try:
+            net.cut()
+            bus.payload(f"camera/{camera}/status", lambda status: status.state == "degraded", NOTICED_S)
+            bus.collect(seconds)
+            bus.forget()
+            assert door.moving, "a camera without a network turns on"
+            met = len(door.log())
+        finally:
+            net.mend()
+        back = time.time()
+        peers.wait_until(lambda: len(door.log()) > met, "a request", 10.0)
+        first = door.log()[met]
+        until_still(door)
+        bus.payload(f"camera/{camera}/status", lambda status: status.state == "online", 15.0)
+        rests(door)
+        assert bus.order(camera, "Flip", "True").state == "done"
+    assert "action=stop" in first["target"], f"the first request was {first['target']}"
+    return float(first["time"]) - back
+
+
+def turn(bus: Client, flat: SmallFlat, camera: str, move: str = "Left 2 20") -> None:
+    """Lets a camera turn by an order, and waits until it has turned for some degrees."""
+    door = flat.doors[camera]
+    door.tell("pose", pan=90.0, tilt=20.0)
+    bus.payload(f"camera/{camera}/position", lambda position: abs(position.pan - 90.0) < 1, 5.0)
+    bus.say(f"camera/{camera}/order/Move", move)
+    peers.wait_until(lambda: apart(door.state()["pose"]["pan"], 90.0) > 3 and door.moving, "the camera to turn", 10.0)
+
+
+def until_still(door: Door) -> float:
+    """Seconds until the motor stands still."""
+    began = time.monotonic()
+    peers.wait_until(lambda: not door.moving, "the motor to stand still", 10.0)
+    return time.monotonic() - began
+
+
+def rests(door: Door) -> None:
+    """Nothing moves for a second: nobody starts anything."""
+    pose, end = door.state()["pose"], time.monotonic() + 1.0
+    while time.monotonic() < end:
+        assert not door.moving
+    assert door.state()["pose"] == pose
+
+
+def apart(one: float, other: float) -> float:
+    """Degrees between two pan readings."""
+    return abs((one - other + 180) % 360 - 180)
+
+
+KILLS = (kill_service, kill_supervisor, kill_broker)

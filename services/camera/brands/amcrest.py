@@ -5,12 +5,15 @@ from __future__ import annotations
 import httpx
 
 from services.camera.address import Address
-from services.camera.brands.dahua import picture, ptz, replies, system
+from services.camera.alarm.listener import Ear
+from services.camera.brands.dahua import errands, picture, ptz, replies, streams, system
 from services.camera.requests import (
     Away,
     Camera,
     ClearPreset,
     Direction,
+    Errand,
+    FindStream,
     GetPicture,
     GotoPreset,
     Identify,
@@ -26,7 +29,9 @@ from services.camera.requests import (
     Status,
     Stop,
 )
-from services.camera.web.connection import COMMAND, SNAPSHOT, connection, fetch
+from services.camera.sound.desk import Sound
+from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch
+from services.camera.web.dahua import DahuaEar, DahuaSound
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
 
@@ -42,6 +47,7 @@ class Amcrest:
         *,
         urgent: bool = False,
     ) -> None:
+        self.address = address
         self.login = Login(address.user, address.password, gate or Gate(), urgent=urgent)
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
@@ -70,16 +76,20 @@ class Amcrest:
                 return self._picture()
             case SetPicture():
                 return self._set_picture(request)
+            case FindStream(source):
+                return streams.address(self.address, source)
             case Identify():
                 return self._identify()
             case Reboot():
                 return self._command(system.magic("reboot"))
+            case Errand():
+                return self._talk(errands.dialogue(request))
 
     def _get(self, target: str, timeout: httpx.Timeout = COMMAND) -> httpx.Response:
         return replies.check(fetch(self.http, target, timeout))
 
-    def _command(self, target: str) -> object:
-        body = self._get(target).text
+    def _command(self, target: str, timeout: httpx.Timeout = COMMAND) -> object:
+        body = self._get(target, timeout).text
         if not replies.is_ok(body):
             raise Refused(f"expected OK from the camera, got {' '.join(body.split())[:80]!r}")
         return None
@@ -96,7 +106,7 @@ class Amcrest:
         directions = [known] if known is not None and not request.every else list(Direction)
         for direction in directions:
             try:
-                self._command(ptz.stop(direction, channel))
+                self._command(ptz.stop(direction, channel), STOP)
             except Refused as error:  # firmware that refuses to stop what does not run
                 refused.append(error)
         if len(refused) == len(directions):
@@ -145,10 +155,33 @@ class Amcrest:
             self._command(picture.set_mode(request.mode))
         return self._picture()
 
+    def _talk(self, dialogue: errands.Dialogue) -> object:
+        try:
+            target = next(dialogue)
+            while True:
+                try:
+                    body = self._get(target).text
+                except Refused as error:
+                    target = dialogue.throw(error)
+                else:
+                    target = dialogue.send(body)
+        except StopIteration as stop:
+            return stop.value
+
     def _identify(self) -> Identity:
         model = replies.read_table(self._get(system.magic("getDeviceType")).text).get("type", "")
         serial = replies.read_table(self._get(system.magic("getSerialNo")).text).get("sn", "")
         return Identity(model, serial, system.read_version(self._get(system.magic("getSoftwareVersion")).text))
+
+
+def ear(address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> Ear:
+    """The camera's own alarms; it gives a sign of life every `heartbeat_s`."""
+    return DahuaEar(address, gate, codes, heartbeat_s)
+
+
+def sound(address: Address, gate: Gate) -> Sound:
+    """The camera's microphone and loudspeaker."""
+    return DahuaSound(address, gate)
 
 
 def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:

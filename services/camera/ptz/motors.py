@@ -75,6 +75,10 @@ class Motors:
             self.stage.drop(self._halting)
         self._halt(halt(now), now)
 
+    def give_up(self, why: str, now: float) -> None:
+        """Ends whatever runs or waits, with a stop, although nobody ordered it."""
+        self._cancel(why, now)
+
     def make_sure(self, now: float) -> None:
         """Stops what somebody else may have started."""
         if not self.busy:

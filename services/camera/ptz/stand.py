@@ -50,7 +50,7 @@ def stop(now: float, *, every: bool = False) -> Plan[Reply]:
             return reply
         locked = isinstance(reply.error, BadLogin | Locked)
         yield from wait(reply.received + (LOCKED_PAUSE_S if locked else pause))
-        pause = min(2 * pause, 0.5)
+        pause = min(2 * pause, 0.25)  # the stop is to arrive within 1 s of the network's return
 
 
 def _stands() -> Plan[bool]:

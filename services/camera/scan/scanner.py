@@ -19,8 +19,9 @@ from services.camera.ptz.pace import Skill
 from services.camera.requests import GetPicture, Picture, Refused
 from services.camera.scan import sightings
 from services.camera.scan.analysis import Analysed, Analyst, Task
-from services.camera.scan.search import Frame, Scan, shortest
+from services.camera.scan.search import Frame, Scan, Take, shortest, snapshot
 from services.camera.scan.sightings import Eye
+from services.camera.scan.streamed import Streamed
 from services.camera.settings import Config
 from services.payloads import OrderState, Place, ScanState
 
@@ -51,7 +52,7 @@ class Scanner:
     @property
     def kind(self) -> Literal["ceiling", "shelf"]:
         """How the camera is mounted."""
-        return self.config.mount.kind if self.config.mount else "ceiling"
+        return self.config.kind
 
     def check(self, order: ScanFor) -> None:
         """Refused when it cannot be done."""
@@ -61,6 +62,7 @@ class Scanner:
 
     def plan(self, order: ScanFor, now: float) -> Plan[None]:
         """A new scan."""
+        take = self._take()
         self.scan = Scan(
             name=uuid4().hex[:12],
             targets=order.targets or self.targets,
@@ -69,10 +71,11 @@ class Scanner:
             skill=self.skill,
             began=now,
             frames=self.config.frames,
-            settle_s=self.config.settle_s,
+            settle_s=self.config.settle_s if take is snapshot else 0.0,  # a stream's pictures tell their time
             stop_early=self.config.stop_early,
             move_timeout_s=self.config.move_timeout_s,
             kind=self.kind,
+            take=take,
         )
         self._looking = self.analyst()
         return self._run(self.scan)
@@ -114,6 +117,13 @@ class Scanner:
         if self._looking is not None:
             self._looking.close()
             self._looking = None
+
+    def _take(self) -> Take:
+        """Where the frames come from."""
+        video, lens = self.bulletin.video, self.eye.lens
+        if self.config.scan_pictures == "snapshot" or video is None or not video.flows:
+            return snapshot
+        return Streamed(video, lens.width / lens.height if lens else None)
 
     def _run(self, scan: Scan) -> Plan[None]:
         yield from attempt(GetPicture())  # how the frames will be turned, as far as the camera tells

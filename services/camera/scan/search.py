@@ -40,6 +40,19 @@ class Frame:
 
 
 Look = Callable[[Frame, bytes], None]
+Take = Callable[[float, float], Plan[tuple[bytes, float, float]]]
+"""Plans a picture from after a moment, given the time now: its bytes, when it was exposed, and the time then."""
+
+
+def snapshot(after: float, now: float) -> Plan[tuple[bytes, float, float]]:
+    """A Take: asked for now, when the camera has been at rest for a while."""
+    for _ in range(TRIES - 1):
+        reply = yield from attempt(Snapshot())
+        if reply.error is None:
+            return cast(bytes, reply.result), reply.sent, reply.received
+        yield from wait(reply.received + 0.3)
+    reply = yield from ask(Snapshot())
+    return cast(bytes, reply.result), reply.sent, reply.received
 
 
 @dataclass
@@ -57,6 +70,7 @@ class Scan:
     stop_early: bool = True
     kind: Kind = "ceiling"
     move_timeout_s: float = 60.0
+    take: Take = snapshot
     place: str | None = None
     taken: list[Frame] = field(default_factory=list)
     analysed: int = 0
@@ -127,7 +141,7 @@ class Scan:
         arrival = yield from goto(goal, self.limits, self.skill, now + self.move_timeout_s)
         now = yield from wait(arrival.at + self.settle_s)
         for _ in range(self.frames):
-            jpeg, at, now = yield from _picture()
+            jpeg, at, now = yield from self.take(arrival.at, now)
             frame = Frame(len(self.taken), self.place or "", arrival.reading, at)
             self.taken.append(frame)
             look(frame, jpeg)
@@ -140,17 +154,6 @@ class Scan:
                 raise Away("the frames were not looked at in time")
             now = yield from wait(now + 0.05)
         return now
-
-
-def _picture() -> Plan[tuple[bytes, float, float]]:
-    """A snapshot, when it was asked for (it is not older than that), and the time now."""
-    for _ in range(TRIES - 1):
-        reply = yield from attempt(Snapshot())
-        if reply.error is None:
-            return cast(bytes, reply.result), reply.sent, reply.received
-        yield from wait(reply.received + 0.3)
-    reply = yield from ask(Snapshot())
-    return cast(bytes, reply.result), reply.sent, reply.received
 
 
 def shortest(places: Mapping[str, Place], limits: Limits, reading: Reading | None) -> list[str]:

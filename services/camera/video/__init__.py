@@ -1,1 +1,1 @@
-"""Pictures of the camera."""
+"""Pictures of the camera: one connection, the newest frame, and the stream that others may look at."""

@@ -26,9 +26,9 @@ def decode(jpeg: bytes) -> Image:
     return image.astype(np.uint8, copy=False)
 
 
-def encode(image: Image) -> bytes:
+def encode(image: Image, quality: int = QUALITY) -> bytes:
     """The picture as JPEG."""
-    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return data.tobytes()
 
 

@@ -6,6 +6,7 @@ after a second 401 once more half a second later. How many logins may fail at al
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import re
 import secrets
@@ -93,6 +94,14 @@ def authorization(challenge: Challenge, user: str, password: str, method: str, u
     return "Digest " + ", ".join(fields)
 
 
+def header(challenge: Challenge, user: str, password: str, method: str, uri: str, cnonce: str) -> str:
+    """The `Authorization` header that answers a challenge of either kind; counts the use of its nonce."""
+    if challenge.scheme == "basic":
+        return "Basic " + base64.b64encode(f"{user}:{password}".encode()).decode()
+    challenge.count += 1
+    return authorization(challenge, user, password, method, uri, cnonce)
+
+
 @dataclass
 class Nonces:
     """Whether this firmware takes a nonce more than once, learnt from what it does."""
@@ -155,6 +164,9 @@ class Login(httpx.Auth):
                 self.gate.pause(ODD_S)
             old = self.challenge.count > 0
             with self.gate.login(urgent=self.urgent) as login:
+                if old and login.doubted:
+                    self.challenge = None
+                    continue
                 self._sign(request, self.challenge)
                 outcome = self._read((yield request))
                 if outcome == "passed":
@@ -195,12 +207,5 @@ class Login(httpx.Auth):
 
     def _sign(self, request: httpx.Request, challenge: Challenge) -> None:
         secret = self.password.get_secret_value()
-        if challenge.scheme == "basic":
-            login = httpx.BasicAuth(self.user, secret)
-            next(login.auth_flow(request))
-            return
-        challenge.count += 1
         target = request.url.raw_path.decode("ascii")
-        request.headers["Authorization"] = authorization(
-            challenge, self.user, secret, request.method, target, self.cnonce()
-        )
+        request.headers["Authorization"] = header(challenge, self.user, secret, request.method, target, self.cnonce())

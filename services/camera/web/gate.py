@@ -98,8 +98,9 @@ class Book:
 class Try:
     """One login that is on its way: tell what became of it before the context ends; nothing when no answer came."""
 
-    def __init__(self, gate: Gate, number: int) -> None:
+    def __init__(self, gate: Gate, number: int, *, doubted: bool) -> None:
         self._gate, self._number = gate, number
+        self.doubted = doubted  # one has failed: another with an old nonce would prove nothing, and is one too many
 
     def passed(self) -> None:
         """The camera knows us (it may refuse what was asked, for want of rights)."""
@@ -149,8 +150,9 @@ class Gate:
             if not self.changed.wait_for(lambda: self._open(urgent), PATIENCE_S):
                 raise Away("other logins to this camera have no answer yet")
             number = self.book.tries(urgent=urgent)
+            doubted = self.book.failures > 0
         try:
-            yield Try(self, number)
+            yield Try(self, number, doubted=doubted)
         finally:
             with self.changed:
                 self.book.back(urgent=urgent)

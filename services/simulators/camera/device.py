@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from random import Random
 from threading import RLock
+from typing import Literal, TypeVar
 
 from services.simulators.camera.clock import Clock
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.events import CODES, Events
 from services.simulators.camera.identity import Identity
 from services.simulators.camera.latency import Latency
-from services.simulators.camera.messages import OK, Answer, Request, lines, refusal
+from services.simulators.camera.messages import OK, Answer, Request, lines, refusal, refuses_brackets
 from services.simulators.camera.motion import MotionDetector
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.profiles import Profile
 from services.simulators.camera.ptz import Ptz
 from services.simulators.true_camera import WorldCamera
 
+T = TypeVar("T")
 Program = Callable[[Request, float], Answer]
 
 
@@ -32,6 +34,8 @@ class Device:
         self.events, self.detector = Events(profile), MotionDetector(self.tables)
         self.identity, self.clock = Identity(profile, camera.serial, self.tables), Clock(now)
         self.boots_until = float("-inf")
+        self.rights = True  # whether the account may do more than look
+        self._dice = Random(camera.serial)
         self._lock = RLock()
         self._programs: dict[str, Program] = {
             "magicBox": self._magic_box,
@@ -39,6 +43,7 @@ class Device:
             "configManager": self._config_manager,
             "eventManager": self._event_manager,
             "ptz": self.ptz.answer,
+            "ptzBase": self.ptz.answer,
             "IntervideoManager": self.identity.versions,
             "storageDevice": self.identity.storage,
             "devAudioInput": self.identity.sound_devices,
@@ -47,6 +52,10 @@ class Device:
 
     def answer(self, request: Request, now: float) -> Answer:
         """One request with a short answer."""
+        if refuses_brackets(self.profile, request.target):
+            return Answer(b"Error\r\nBad Request!\r\n", 400)
+        if not self.rights and (request.cgi.startswith("ptz") or request.action in ("setConfig", "reboot")):
+            return Answer(b"Error\r\nInvalid Authority!\r\n", 401)
         with self._lock:
             program = self._programs.get(request.cgi)
             return program(request, now) if program else Answer(b"", 404)
@@ -54,6 +63,7 @@ class Device:
     def motion(self, now: float) -> tuple[Pose, Pose]:
         """The true pose, and how fast each reading changes (degrees/s, levels/s)."""
         with self._lock:
+            self.ptz.rounds.advance(now)
             return self.ptz.motors.pose(now), self.ptz.motors.rates(now)
 
     def place(self, pose: Pose, now: float) -> None:
@@ -61,7 +71,7 @@ class Device:
         with self._lock:
             self.ptz.motors.place(pose, now)
 
-    def step(self, act: Callable[[], Answer]) -> Answer:
+    def step(self, act: Callable[[], T]) -> T:
         """Something that another program of the camera does, undisturbed by the others."""
         with self._lock:
             return act()
@@ -74,18 +84,25 @@ class Device:
         if change is not None:
             self.events.tell("VideoMotion", change)
 
+    def drops_snapshot(self) -> Literal["close", "text"] | None:
+        """Whether this snapshot has no answer, or one that is no picture, as happens with some firmware."""
+        if self._dice.random() >= self.profile.snapshot_drop:
+            return None
+        return self._dice.choice(("close", "text"))
+
     def booting(self, now: float) -> bool:
         """Whether it is restarting and answers nobody."""
         return now < self.boots_until
 
     def _magic_box(self, request: Request, now: float) -> Answer:
-        if request.action in ("reboot", "shutdown"):  # a camera that is shut down comes back too
+        if request.action in ("reboot", "shutdown"):  # some models come up again after a shutdown too
             return self.reboot(now)
         return self.identity.magic_box(request, now)
 
     def reboot(self, now: float) -> Answer:
         """Presets and configuration stay; the motors return to where they are after power-on."""
         self.boots_until = now + self.profile.boot_s
+        self.latency.drowsy_until = self.boots_until + self.profile.drowsy_s
         self.ptz.motors.place(Pose(*self.camera.starts_at), now)
         self.events.forget()
         self.detector.forget()
@@ -106,6 +123,8 @@ class Device:
         return OK
 
     def _config_manager(self, request: Request, now: float) -> Answer:
+        if request.action == "getTours":
+            return self.ptz.list_tours()
         if request.action == "setConfig":
             return self._write([(key, value) for key, value in request.query if key != "action"], now)
         found = self.tables.read(request.text("name")) if request.action == "getConfig" else None

@@ -25,7 +25,7 @@ def video(camera: CameraServer, request: Request) -> Generator[bytes]:
     encoders = camera.device.tables.encoders
     while not camera.closing.wait(1 / camera.pictures.fps(stream)) and camera.device.tables.encoders == encoders:
         if camera.shows_pictures:
-            data = camera.pictures.jpeg(stream, camera.clock())
+            data = camera.faults.picture(camera.pictures.jpeg(stream, camera.clock()))
             head = f"--{events.BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
             yield head.encode() + data + b"\r\n"
 

@@ -8,7 +8,6 @@ import sys
 from collections import deque
 from collections.abc import Callable, Generator
 from contextlib import closing, suppress
-from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
@@ -18,7 +17,8 @@ from typing import Any
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, Verdict
 from services.simulators.camera.endless import ENDLESS
-from services.simulators.camera.messages import Answer, Request, read, refusal
+from services.simulators.camera.faults import Faults, Network
+from services.simulators.camera.messages import Answer, Request, read, refusal, spelt
 from services.simulators.camera.onvif.service import Onvif
 from services.simulators.camera.view.picture import Pictures
 
@@ -26,24 +26,6 @@ IMAGE = "image/jpeg"
 LOG_LENGTH = 2000
 SOAP_BYTES = 1 << 20
 ROOT = b"<html><head><title>WEB</title></head><body></body></html>"
-
-
-@dataclass
-class Faults:
-    """What the side door has ordered: how the next requests fail, and whether the camera is frozen."""
-
-    left: int = 0
-    how: str = "close"  # or 401, 500, text
-    silent_events: bool = False  # event streams stay open and say nothing, not even that they live
-    frozen_stream: bool = False  # video connections stay open without a new picture
-    corrupt_jpeg: bool = False
-
-    def next(self) -> str | None:
-        """How this request is to fail."""
-        if self.left <= 0:
-            return None
-        self.left -= 1
-        return self.how
 
 
 class Port(ThreadingHTTPServer):
@@ -66,8 +48,9 @@ class CameraServer(Port):
     ) -> None:
         super().__init__(address, Connection)
         self.device, self.door, self.pictures, self.clock = device, door, pictures, clock
+        self.closing, self.log = Event(), deque[dict[str, Any]](maxlen=LOG_LENGTH)
+        self.faults, self.network = Faults(), Network()
         self.cuts: list[Callable[[], None]] = []  # how the connections of other ports are cut
-        self.closing, self.faults, self.log = Event(), Faults(), deque[dict[str, Any]](maxlen=LOG_LENGTH)
         self.running = Event()  # cleared while frozen
         self.running.set()
         self.control, self.snapshot, self._lock = Lock(), Lock(), Lock()
@@ -79,10 +62,10 @@ class CameraServer(Port):
         if seconds > 0:
             self.closing.wait(seconds)
 
-    def judge(self, method: str, target: str, header: str | None) -> Verdict:
+    def judge(self, method: str, target: str, header: str | None, address: str) -> Verdict:
         """The door's verdict, one request at a time."""
         with self._lock:
-            return self.door.judge(method, target, header, self.clock())
+            return self.door.judge(method, target, header, self.clock(), address)
 
     def judge_viewer(self, method: str, header: str | None) -> bool:
         """The same for RTSP, where the challenge is another's."""
@@ -91,13 +74,24 @@ class CameraServer(Port):
 
     @property
     def is_off(self) -> bool:
-        """Whether nobody is answered: it restarts, or is switched off."""
-        return self.device.booting(self.clock()) or self.closing.is_set()
+        """Whether nobody is answered: it restarts, or is switched off, or a router says that it is not there."""
+        return self.device.booting(self.clock()) or self.closing.is_set() or self.network.refuses
 
     @property
     def shows_pictures(self) -> bool:
         """Whether new pictures go out."""
-        return self.running.is_set() and not self.faults.frozen_stream and not self.is_off
+        way = self.running.is_set() and self.network.up.is_set()
+        return way and not self.faults.frozen_stream and not self.is_off
+
+    @property
+    def turns_viewers_away(self) -> bool:
+        """Whether a new RTSP connection is closed at once."""
+        return self.faults.always == "close" or not self.network.up.is_set()
+
+    @property
+    def connected(self) -> int:
+        """How many connections there are."""
+        return len(self._open)
 
     def enter(self, connection: socket.socket) -> None:
         """A connection was opened."""
@@ -108,6 +102,29 @@ class CameraServer(Port):
         """A connection is about to be closed."""
         with self._lock:
             self._open.discard(connection)
+
+    def set_account(self, user: str, password: str) -> None:
+        """Another password; the old one does not pass any more."""
+        with self._lock:
+            self.door.set_account(user, password)
+        if self.onvif is not None:
+            self.onvif.set_account(user, password)
+
+    def restart(self) -> None:
+        """Somebody pulled the plug and put it in again."""
+        self.device.step(lambda: self.device.reboot(self.clock()))
+        self.went_down()
+
+    def went_down(self) -> None:
+        """The camera restarts: nobody is connected any more, no nonce is known."""
+        with self._lock:
+            self.door.forget()
+        self.drop()
+
+    def challenges(self) -> list[str]:
+        """What the door asks of somebody who said nothing."""
+        with self._lock:
+            return self.door.challenges()
 
     def drop(self) -> None:
         """Cuts every connection."""
@@ -127,6 +144,7 @@ class CameraServer(Port):
         """Ends every wait and connection, so that `server_close` finds no thread left."""
         self.closing.set()
         self.running.set()
+        self.network.up.set()
         self.drop()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
@@ -164,15 +182,20 @@ class Connection(BaseHTTPRequestHandler):
         self.close_connection = True
         entry = {"time": self.server.clock(), "method": self.command, "target": self.path, "status": None}
         entry["authorized"] = "Authorization" in self.headers
+        if not self.server.network.passes(self.connection, self.server.closing):
+            return self._reset()
         self.server.log.append(entry)
         self.server.running.wait()
         if fault := self.server.faults.next():
             return self._fail(fault, entry)
         if self.path == "/":
             return self._send(Answer(ROOT, content_type="text/html"), entry)
+        if self.server.connected > self.server.device.profile.max_connections:
+            return self._turn_away(entry)
         if self.path.startswith("/onvif/"):
             return self._soap(entry)
-        verdict = self.server.judge(self.command, self.path, self.headers.get("Authorization"))
+        header, (address, _) = self.headers.get("Authorization"), self.client_address
+        verdict = self.server.judge(self.command, self.path, header, address)
         if verdict.passed:
             return self._serve(read(self.path), entry)
         return self._challenge(verdict, entry)
@@ -192,11 +215,11 @@ class Connection(BaseHTTPRequestHandler):
         """One at a time, and it acts when it has been processed."""
         encoders = self.server.device.tables.encoders
         with self.server.control:
-            self.server.delay(self.server.device.latency.control())
+            self.server.delay(self.server.device.latency.control(self.server.clock()))
             answer = self.server.device.answer(request, self.server.clock())
         self._send(answer, entry)
         if self.server.device.booting(self.server.clock()):
-            self.server.drop()
+            self.server.went_down()
         elif self.server.device.tables.encoders != encoders:
             self.server.cut_streams()
 
@@ -208,11 +231,11 @@ class Connection(BaseHTTPRequestHandler):
         length = self.headers.get("Content-Length", "")
         body, host = self.rfile.read(min(int(length), SOAP_BYTES) if length.isdigit() else 0), self.headers["Host"]
         with self.server.control:
-            self.server.delay(self.server.device.latency.control())
+            self.server.delay(self.server.device.latency.control(clock()))
             answer = self.server.device.step(lambda: onvif.answer(body, host, clock()))
         self._send(answer, entry)
         if self.server.device.booting(clock()):
-            self.server.drop()
+            self.server.went_down()
 
     def _snapshot(self, request: Request, entry: dict[str, Any]) -> None:
         """Overlapping snapshots fail."""
@@ -223,7 +246,9 @@ class Connection(BaseHTTPRequestHandler):
             data = self.server.pictures.jpeg("MainFormat", self.server.clock())
         finally:
             self.server.snapshot.release()
-        return self._send(Answer(data, content_type=IMAGE), entry)
+        if how := self.server.device.drops_snapshot():
+            return self._fail(how, entry)
+        return self._send(Answer(self.server.faults.picture(data), content_type=IMAGE), entry)
 
     def _endless(self, chunks: Generator[bytes], entry: dict[str, Any]) -> None:
         entry["status"] = 200
@@ -235,25 +260,30 @@ class Connection(BaseHTTPRequestHandler):
         entry["status"] = 401
         offers = "".join(f"WWW-Authenticate: {offer}\r\n" for offer in verdict.challenges)
         head = f"HTTP/1.1 401 Unauthorized\r\n{offers}Connection: close\r\nCONTENT-LENGTH: {len(verdict.body)}\r\n\r\n"
-        self._write(head.encode() + verdict.body)
+        self._write(spelt(self.server.device.profile, head) + verdict.body)
+
+    def _turn_away(self, entry: dict[str, Any]) -> None:
+        """Too many are connected; a 401 then says nothing about the password."""
+        if self.server.device.profile.over_limit == 401:
+            return self._challenge(Verdict(False, self.server.challenges()), entry)
+        return self._send(Answer(b"Error\r\nBad Request!\r\n", 400), entry)
 
     def _fail(self, how: str, entry: dict[str, Any]) -> None:
         entry["status"] = how
         if how == "close":
             return self._reset()
         if how == "401":
-            return self._challenge(
-                Verdict(False, [f'Digest realm="{self.server.door.realm}",qop="auth",nonce="0"']), entry
-            )
+            return self._challenge(Verdict(False, self.server.challenges()), entry)
         return self._send(Answer(b"Error\r\n", 500) if how == "500" else Answer(b"busy\r\n"), entry)
 
     def _send(self, answer: Answer, entry: dict[str, Any]) -> None:
         entry["status"] = answer.status
         head = f"HTTP/1.1 {answer.status} {HTTPStatus(answer.status).phrase}\r\nConnection: close\r\n"
         head += f"Content-Length: {len(answer.body)}\r\nContent-Type: {answer.content_type}\r\n\r\n"
-        self._write(head.encode() + answer.body)
+        self._write(spelt(self.server.device.profile, head) + answer.body)
 
     def _write(self, data: bytes) -> None:
+        self.server.network.passes(self.connection, self.server.closing)
         self.connection.sendall(data)
 
     def _reset(self) -> None:

@@ -41,6 +41,20 @@ def read(target: str) -> Request:
     return Request(target, cgi, tuple((unquote(key), unquote(value)) for key, _, value in pairs))
 
 
+def spelt(profile: Profile, head: str) -> bytes:
+    """A header block with the names spelt as this firmware does."""
+    first, *fields = head.split("\r\n")
+    if profile.header_case == "upper":
+        fields = [name.upper() + colon + value for name, colon, value in (line.partition(":") for line in fields)]
+    return "\r\n".join((first, *fields)).encode()
+
+
+def refuses_brackets(profile: Profile, target: str) -> bool:
+    """Whether this firmware does not read the brackets of a target as they are spelt."""
+    wrong = {"raw": ("%5b", "%5d"), "encoded": ("[", "]"), "both": ()}[profile.brackets]
+    return any(spelling in target.lower() for spelling in wrong)
+
+
 @dataclass(frozen=True)
 class Answer:
     """An answer with a body of known length."""

@@ -104,6 +104,16 @@ class Motors:
         pan, tilt, zoom = (moment.speed for moment in self._moments(at))
         return Pose(-pan, tilt, zoom)
 
+    @property
+    def code(self) -> str:
+        """Of the last motion; empty when it was stopped."""
+        return self._past[-1].code
+
+    @property
+    def rests_at(self) -> float:
+        """When the last motion ends, if nobody stops it."""
+        return max(track.ends for track in self._past[-1].tracks)
+
     def worked(self, now: float) -> Worked:
         """What they have done so far."""
         tracks = self._past[-1].tracks
@@ -129,7 +139,7 @@ class Motors:
 
     def stop(self, code: str, now: float) -> None:
         """Slows down the motion that was started with this code, and no other."""
-        if self._past[-1].code == code:
+        if self.code == code:
             self.halt(now)
 
     def go(self, goal: Pose, now: float, code: str = "GotoPreset", level: int = 8) -> None:

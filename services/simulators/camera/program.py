@@ -13,11 +13,10 @@ from threading import Thread
 from services.errors import ConfigError
 from services.simulators.camera import rtsp
 from services.simulators.camera.device import Device
-from services.simulators.camera.digest import Door
+from services.simulators.camera.digest import Door, realm
 from services.simulators.camera.http import CameraServer
 from services.simulators.camera.latency import Latency
 from services.simulators.camera.onvif.service import Onvif
-from services.simulators.camera.profiles import PROFILES
 from services.simulators.camera.settings import Config
 from services.simulators.camera.side_door import SideDoor
 from services.simulators.camera.view.picture import Pictures
@@ -83,10 +82,10 @@ def inside(config: Config, now: float) -> Inside:
     world = load(config.folder / config.world)
     if config.camera not in world.cameras:
         raise ConfigError([f"camera: expected one of {', '.join(world.cameras)}, got {config.camera!r}"])
-    camera, profile = world.cameras[config.camera], PROFILES[config.profile]
+    camera, profile = world.cameras[config.camera], config.switches
     device = Device(camera, profile, now, Latency(profile, config.latency_s, Random(config.seed)))
-    realm, password = f"Login to {camera.serial}", config.password.get_secret_value()
-    door = Door(realm, config.user, password, profile, Random(config.seed))
+    password = config.password.get_secret_value()
+    door = Door(realm(profile, camera.serial), config.user, password, profile, Random(config.seed))
     pictures = Pictures(Scene(world, camera.lens, config.seed), camera, device.tables, device.motion, config.seed)
     return Inside(device, door, pictures)
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
-from pydantic import Field, SecretStr, field_validator
+from pydantic import Field, SecretStr, ValidationInfo, field_validator
 
 from services.section import Section
-from services.simulators.camera.profiles import PROFILES
+from services.simulators.camera.firmwares import PROFILES
+from services.simulators.camera.profiles import Profile
 
 
 class Config(Section):
@@ -23,6 +26,7 @@ class Config(Section):
     user: str = "ros"
     password: SecretStr = SecretStr("")
     profile: str = "ip3m-941w-2019"
+    switches: Profile = Field(default_factory=dict, validate_default=True)  # those of the profile that are others
     latency_s: float | None = Field(default=None, ge=0)  # of each request; None: the profile's
     seed: int = 1  # of textures, noise and nonces
 
@@ -32,3 +36,9 @@ class Config(Section):
         if name not in PROFILES:
             raise ValueError(f"expected one of {', '.join(PROFILES)}, got {name!r}")
         return name
+
+    @field_validator("switches", mode="before")
+    @classmethod
+    def change_the_profile(cls, given: Any, info: ValidationInfo) -> Any:
+        whole = PROFILES.get(info.data.get("profile", ""), Profile())
+        return {**asdict(whole), **given} if isinstance(given, dict) else given

@@ -9,6 +9,8 @@ POST /stir     {"seconds"}               something moves before the lens for so 
 POST /clock    {"offset_s", "drift_ppm"} the camera's clock is wrong by so much, and gains so many us/s
 POST /card     {"in"}                    whether a memory card is in it
 POST /fail     {"n", "how"}              the next n requests: close, 401, 500 or text
+POST /fault    {"name", "on", ...}       switches a fault on or off; `troubles` lists them and what they take
+POST /well     {}                        switches every fault off
 POST /drop     {}                        cuts every connection
 POST /freeze   {"on"}                    accepts, and answers nobody
 POST /latency  {"seconds"}               of every control request from now on
@@ -22,6 +24,7 @@ from dataclasses import asdict
 from http.server import BaseHTTPRequestHandler
 from typing import Any
 
+from services.simulators.camera import troubles
 from services.simulators.camera.http import CameraServer, Port
 from services.simulators.camera.motors import Axes, reading
 
@@ -46,7 +49,7 @@ def state(camera: CameraServer) -> dict[str, Any]:
 def motors(camera: CameraServer) -> dict[str, Any]:
     """The constants of each axis (pan as travel: reading = (180 - travel) mod 360), and what has been done so far."""
     ptz = camera.device.ptz
-    worked = ptz.motors.worked(camera.clock())
+    worked = camera.device.step(lambda: ptz.motors.worked(camera.clock()))
     axes = {name: asdict(rail) for name, rail in zip(Axes._fields, ptz.motors.rails, strict=True)}
     done = {"travelled": worked.travelled._asdict(), "pushed_s": worked.pushed_s._asdict()}
     return {"axes": axes, **done, "motions": worked.motions, "commands": ptz.commands}
@@ -95,6 +98,8 @@ ORDERS: dict[str, Order] = {
     "/clock": _clock,
     "/card": _card,
     "/fail": _fail,
+    "/fault": troubles.switch,
+    "/well": lambda camera, order: troubles.clear(camera),
     "/drop": lambda camera, order: camera.drop(),
     "/freeze": _freeze,
     "/latency": _latency,

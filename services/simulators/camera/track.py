@@ -72,6 +72,11 @@ class Track:
             position, left = position + piece.after(piece.seconds).position, left - piece.seconds
         return Moment(self.rest, 0.0)
 
+    @property
+    def ends(self) -> float:
+        """When it comes to rest."""
+        return self.began + sum(piece.seconds for piece in self.pieces)
+
     def travelled(self, now: float) -> float:
         """How far it went by then, there and back both counted."""
         return sum(abs(piece.after(seconds).position) for piece, seconds in self._until(now))

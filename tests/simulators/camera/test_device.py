@@ -7,9 +7,10 @@ from dataclasses import replace
 import pytest
 
 from services.simulators.camera.device import Device
+from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.messages import read
 from services.simulators.camera.motors import Pose
-from services.simulators.camera.profiles import PROFILES, Profile
+from services.simulators.camera.profiles import Profile
 from services.simulators.world import World
 
 
@@ -78,7 +79,8 @@ def test_the_status_has_the_misspelt_key_and_tenths(device: Device) -> None:
 @pytest.mark.parametrize("form", ["a", "b", "c"])
 def test_every_status_form_tells_the_position(world: World, form: str) -> None:
     device = Device(world.cameras["ip1"], replace(Profile(), status_form=form), 0.0)  # type: ignore[arg-type]
-    assert "status.Postion[0]=0.000000\r\n" in _ask(device, "ptz.cgi?action=getStatus&channel=1")
+    told = _ask(device, "ptz.cgi?action=getStatus&channel=1")
+    assert f"status.Postion[1]={'20.0' if form == 'c' else '20.000000'}\r\n" in told
 
 
 def test_a_preset_is_reached_and_told(device: Device, world: World) -> None:

@@ -45,8 +45,18 @@ def test_the_challenge_has_the_captured_form() -> None:
     parts = challenge.split(",")
     assert parts[:2] == [f'Digest realm="{REALM}"', 'qop="auth"']
     assert [part.partition("=")[0] for part in parts[2:]] == ["nonce", "opaque"]
-    spaced = _door(Profile(spaced_challenge=True)).judge("GET", TARGET, None, 0.0).challenges[0]
+    spaced = _door(Profile(challenge_spacing="spaced")).judge("GET", TARGET, None, 0.0).challenges[0]
     assert ', qop="auth", nonce=' in spaced
+
+
+def test_the_oldest_firmware_has_the_form_of_the_document() -> None:
+    door = _door(Profile(realm="mac"))
+    first = door.judge("GET", TARGET, None, 0.0).challenges[0]
+    assert [part.partition("=")[0] for part in first.split(",")[1:]] == ["nonce", "stale", "qop"]
+    assert "stale=FALSE" in first
+    nonce = _nonce(door.judge("GET", TARGET, None, 0.0))
+    assert door.judge("GET", TARGET, _header(nonce), 0.0).passed
+    assert "stale=TRUE" in door.judge("GET", TARGET, _header(nonce), 0.0).challenges[0]
 
 
 def test_the_right_password_passes_and_a_wrong_one_does_not() -> None:
@@ -54,7 +64,7 @@ def test_the_right_password_passes_and_a_wrong_one_does_not() -> None:
     nonce = _nonce(door.judge("GET", TARGET, None, 0.0))
     assert door.judge("GET", TARGET, _header(nonce), 0.0).passed
     assert not door.judge("GET", TARGET, _header(nonce, 2, "wrong"), 0.0).passed
-    assert door.counters == {"challenges": 1, "passed": 1, "wrong": 1, "stale": 0, "locked": 0}
+    assert door.counters == {"challenges": 1, "passed": 1, "wrong": 1, "stale": 0, "locked": 0, "spurious": 0}
 
 
 def test_the_uri_must_be_the_target_byte_for_byte() -> None:
@@ -91,7 +101,7 @@ def test_an_unknown_nonce_with_the_right_password_is_stale_and_no_failure() -> N
     door = _door()
     verdict = door.judge("GET", TARGET, _header("12345"), 0.0)
     assert 'stale="true"' in verdict.challenges[0]
-    assert door.failures == 0
+    assert door.record().failures == 0
 
 
 def test_five_wrong_passwords_lock_even_the_right_one_out_for_half_an_hour() -> None:

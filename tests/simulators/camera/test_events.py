@@ -10,9 +10,10 @@ import pytest
 
 from services.simulators.camera import events
 from services.simulators.camera.device import Device
+from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.messages import read
 from services.simulators.camera.motors import Pose
-from services.simulators.camera.profiles import PROFILES, Profile
+from services.simulators.camera.profiles import Profile
 from services.simulators.camera.program import Simulated
 from services.simulators.world import World
 

@@ -21,7 +21,7 @@ STOP = read("/cgi-bin/ptz.cgi?action=stop&channel=1&code=Right&arg1=0&arg2=0&arg
 
 def _drawn(seconds: float | None = None, **switches: float) -> list[float]:
     latency = Latency(replace(Profile(), **switches), seconds, Random(3))  # type: ignore[arg-type]
-    return sorted(latency.control() for _ in range(5000))
+    return sorted(latency.control(0.0) for _ in range(5000))
 
 
 def test_most_requests_take_a_third_of_a_second_and_a_few_two_or_three_times_as_long() -> None:

@@ -16,6 +16,7 @@ import pytest
 
 from services.peers import wait_until
 from services.simulators.camera import Config, start
+from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.program import Simulated
 from services.simulators.camera.view.picture import STREAMS
@@ -119,7 +120,7 @@ def test_a_changed_password_counts_here_too(camera: Simulated) -> None:
 
 
 def test_old_firmware_takes_basic(config: Config) -> None:
-    with start(config.model_copy(update={"profile": "ip2m-841b-strict"})) as camera:
+    with start(config.model_copy(update={"switches": PROFILES["ip2m-841b-strict"]})) as camera:
         assert 'WWW-Authenticate: Basic realm="Login to AMC0000000000001"' in _asked(camera, "DESCRIBE")
         with _opened(_url(camera)) as video:
             assert next(_frames(video)).size

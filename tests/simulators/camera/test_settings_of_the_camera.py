@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from services.simulators.camera import Config
+from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.messages import read
 from services.simulators.camera.program import Inside, inside
 
@@ -62,7 +63,7 @@ def test_privacy_covers_the_lens_and_tells_so(camera: Inside) -> None:
 
 
 def test_a_model_without_privacy_refuses_it(config: Config) -> None:
-    plain = inside(config.model_copy(update={"profile": "ip2m-841b-strict"}), NOON)
+    plain = inside(config.model_copy(update={"switches": PROFILES["ip2m-841b-strict"]}), NOON)
     assert _ask(plain, "configManager.cgi?action=getConfig&name=LeLensMask").startswith("Error")
     assert _ask(plain, WRITE + "LeLensMask[0].Enable=true").startswith("Error")
 

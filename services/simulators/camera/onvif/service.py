@@ -39,6 +39,10 @@ class Onvif:
         }  # fmt: skip
         self._operations: dict[str, dict[str, Operation]] = {"tds": device_service, "trt": media, "tptz": ptz}
 
+    def set_account(self, user: str, password: str) -> None:
+        """Whom it lets in from now on."""
+        self._signatures = Signatures(user, password)
+
     def answer(self, body: bytes, host: str, now: float) -> Answer:
         """One message to any of the services; `host` is how the client called the camera."""
         self._host = host

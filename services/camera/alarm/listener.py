@@ -1,0 +1,100 @@
+"""The thread that keeps the camera's event stream open and posts what comes. What it means is said in `motion.py`."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from services.bus import Message
+from services.camera.requests import BadLogin, Event
+from services.camera.web.endless import Silent
+from services.errors import DeviceError
+from services.runner import Post
+
+HEARD = "/camera/alarm"
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0  # between two attempts to attach
+WELL_S = 10.0  # a stream that lasted so long was a good one: the next attempt is made soon
+END_S = 2.0
+
+log = logging.getLogger(__name__)
+
+
+class Ear(Protocol):
+    """What a brand offers: the camera's events."""
+
+    def listen(self) -> Iterator[list[Event]]:
+        """Attaches, yields an empty list then, and what comes; DeviceError when that ends or is not to be had."""
+        ...
+
+    def close(self) -> None:
+        """From any thread: ends `listen`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Heard:
+    """`attached` just now, or `lost` and why, or events that came (a heartbeat is one).
+
+    `silent`: lost because nothing came; `mute`: and nothing ever has.
+    """
+
+    at: float
+    events: tuple[Event, ...] = ()
+    attached: bool = False
+    lost: str | None = None
+    silent: bool = False
+    mute: bool = False
+
+
+class Listener:
+    """Listens until it is closed; posts Heard as `/camera/alarm`."""
+
+    def __init__(self, name: str, ear: Ear, post: Post, clock: Callable[[], float] = time.time) -> None:
+        self._ear, self._post, self._clock = ear, post, clock
+        self._signs = 0  # heartbeats since the beginning: some firmware has none
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"{name} events", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Returns when the thread has ended, or after END_S."""
+        self._closing.set()
+        self._ear.close()
+        self._thread.join(END_S)
+
+    def _run(self) -> None:
+        pause = FIRST_PAUSE_S
+        while not self._closing.is_set():
+            began, least = self._clock(), 0.0
+            lost, silent = "the camera ended it", False
+            try:
+                self._listen()
+            except BadLogin as error:
+                lost, least = str(error), error.again_s
+            except Silent as error:
+                lost, silent = str(error), True
+            except DeviceError as error:
+                lost = str(error)
+            if self._closing.is_set():
+                return
+            mute = silent and self._signs == 0
+            self._tell(Heard(self._clock(), lost=lost, silent=silent, mute=mute))
+            pause = FIRST_PAUSE_S if self._clock() - began > WELL_S else min(LONGEST_PAUSE_S, 2 * pause)
+            self._closing.wait(max(pause, least))
+
+    def _listen(self) -> None:
+        attached = False
+        for events in self._ear.listen():
+            if self._closing.is_set():
+                return
+            self._signs += any(not event.code for event in events)
+            if events or not attached:
+                self._tell(Heard(self._clock(), tuple(events), attached=not attached))
+            attached = True
+
+    def _tell(self, heard: Heard) -> None:
+        self._post(Message(HEARD, value=heard, received=heard.at))

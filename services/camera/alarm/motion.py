@@ -1,0 +1,159 @@
+"""What the camera's events mean: 1 for a while after motion, -1 when the alarm is in trouble. Pure.
+
+    attached ──> the camera is asked whether motion is going on
+    Start    ──> 1, unless the camera itself turns or has just turned: then everything in its picture moves
+    Stop     ──> still 1 for `hold_s`, then 0
+    no Stop within `hold_s` ──> the camera is asked: it may have been lost, or somebody is still there
+    lost     ──> -1 after `GRACE_S`; at once when it had fallen silent, and then until there is a sign of life
+    mute (firmware without heartbeat: silence proves nothing) ──> the camera is asked every `MUTE_ASK_S`
+
+Not here: the connection (`listener.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+from services.camera.alarm.listener import Heard
+from services.camera.errands import GetMotion
+from services.camera.plan import Plan, attempt
+from services.camera.requests import Event, Reply
+from services.payloads import Motion, stamp
+
+GRACE_S = 3.0  # a stream that is back so soon was in no trouble
+UNKNOWN_S = 10.0  # until the first attachment
+MASK_S = 2.0  # after the camera's own motion the picture settles
+MUTE_ASK_S = 5.0
+NEVER = float("-inf")
+
+Value = Literal[0, 1, -1]
+Start = Callable[[Plan[None], float], object]
+
+
+class MotionWatch:
+    """The state of one camera's alarm; `begin` starts a plan that asks the camera."""
+
+    def __init__(self, begin: Start, codes: tuple[str, ...], hold_s: float, *, on: bool) -> None:
+        self.begin = begin
+        self.codes = codes
+        self.hold_s = hold_s
+        self.on = on
+        self.masked = 0  # events that were the camera's own doing
+        self.reconnects = 0
+        self.signs = 0  # events and heartbeats
+        self._attached = False
+        self._mute = self._silent = False
+        self._trouble_at: float | None = None  # when to say so; None: there is none
+        self._why = "not attached yet"
+        self._active = False  # the camera has told no end of it
+        self._moved_at = self._turned_at = NEVER
+        self._asked_at = NEVER
+        self._asking = False
+        self._said: Motion | None = None
+
+    @property
+    def fact(self) -> str:
+        """How it fares, for the diagnostics."""
+        if not self.on:
+            return "off"
+        if self._mute:
+            return "asked every few seconds: this firmware has no heartbeat"
+        return "attached" if self._attached else f"lost: {self._why}"
+
+    @property
+    def trouble(self) -> bool:
+        """Whether it was said to be in trouble."""
+        return self.on and self._said is not None and self._said.value == -1
+
+    def take(self, heard: Heard) -> None:
+        """What the listener posts."""
+        self.signs += len(heard.events)
+        if heard.events:
+            self._mute = self._silent = False
+        if heard.attached:
+            self._attached, self._asked_at = True, NEVER
+        if self._attached and not self._silent:
+            self._trouble_at = None
+        for event in heard.events:
+            self._event(event, heard.at)
+        if heard.lost is not None:
+            self._lose(heard)
+
+    def tick(self, now: float, *, turning: bool, online: bool = True) -> Motion | None:
+        """What is to be published; asks the camera where that is wanted. None: nothing is known yet.
+
+        `online`: whether the camera answers, for what is known of it by asking only.
+        """
+        if turning:
+            self._turned_at = now
+        if not self.on:
+            return Motion(value=-1, since=stamp(now)) if self._said is None else self._said
+        if self._trouble_at is None and not self._attached and not self._mute:
+            self._trouble_at = now + UNKNOWN_S
+        if not self._asking and self._wants_to_ask(now):
+            self._asking, self._asked_at = True, now
+            self.begin(self._ask(), now)
+        value = self._value(now) if online or not self._mute else -1
+        if value is not None and (self._said is None or self._said.value != value):
+            self._said = Motion(value=value, since=stamp(now))
+        return self._said
+
+    def _event(self, event: Event, at: float) -> None:
+        if event.code not in self.codes:
+            return
+        if event.action == "Stop":
+            if self._active:
+                self._active, self._moved_at = False, at
+        elif event.action in ("Start", "Pulse"):
+            self._moves(at, lasting=event.action == "Start")
+
+    def _moves(self, at: float, *, lasting: bool) -> None:
+        if at - self._turned_at < MASK_S:
+            self.masked += 1
+        else:
+            self._active, self._moved_at = lasting, at
+
+    def _lose(self, heard: Heard) -> None:
+        was, self._attached = self._attached, False
+        self.reconnects += was
+        self._mute, self._why = heard.mute, heard.lost or ""
+        self._silent = heard.silent and not heard.mute
+        if heard.mute:
+            self._trouble_at = None
+        elif self._trouble_at is None:
+            self._trouble_at = heard.at + (GRACE_S if was and not heard.silent else 0.0)
+
+    def _wants_to_ask(self, now: float) -> bool:
+        if self._mute:
+            return now - self._asked_at >= MUTE_ASK_S
+        if not self._attached:
+            return False
+        if self._asked_at == NEVER:
+            return True
+        return self._active and now - max(self._moved_at, self._asked_at) >= self.hold_s
+
+    def _ask(self) -> Plan[None]:
+        for code in self.codes:
+            reply = yield from attempt(GetMotion(code))
+            if reply.error is not None or reply.result:
+                break
+        self._told(reply)
+
+    def _told(self, reply: Reply) -> None:
+        self._asking = False
+        if reply.error is not None:
+            self._active = False
+            if self._mute:
+                self._mute, self._why, self._trouble_at = False, str(reply.error), reply.received
+        elif reply.result:
+            self._moves(reply.received, lasting=True)
+        else:
+            self._active = False
+
+    def _value(self, now: float) -> Value | None:
+        if self._trouble_at is not None and now >= self._trouble_at:
+            return -1
+        if self._said is None and (self._asked_at == NEVER or self._asking):
+            return None
+        return 1 if self._active or now - self._moved_at < self.hold_s else 0

@@ -1,0 +1,89 @@
+"""What the probe leaves behind: the configuration's section, a simulator's profile, the report, recorded answers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from services.camera.probe import anonymous
+from services.camera.probe.findings import Findings
+from services.camera.probe.wire import Wire
+
+MEASURED = ("latency_s", "snapshot_s", "tilt_share")
+NOT_SWITCHES = ("event_form", "event_header_twice", "event_length_spaced")  # of no profile yet; they are in the report
+
+
+def section(found: Findings, name: str, user: str) -> str:
+    """The camera's section, as `apartment check` takes it; what could not be found out is a comment."""
+    tilt = found.capabilities.get("tilt_range") or [-10, 108]
+    channels = found.switches.get("ptz_channels") or ()
+    lines = [
+        f"# {' '.join(part for part in (found.vendor, found.model, found.firmware) if part)}".rstrip(),
+        "cameras:",
+        f"  {name}:",
+        f"    brand: {found.brand or 'amcrest'}",
+        f"    url: {found.url}",
+        f"    user: {json.dumps(user)}",
+        f"    password: ${{CAMERA_{name.upper()}_PASSWORD}}",
+    ]
+    if channels:
+        lines.append(f"    channel: {channels[-1]}                              # of the motors")
+    if {"flip", "mirror"} <= set(found.picture):
+        flip, mirror = (str(found.picture[key]).lower() for key in ("flip", "mirror"))
+        lines.append(f"    picture: {{flip: {flip}, mirror: {mirror}}}")
+    lines += [
+        f"    tilt_range: [{tilt[0]:g}, {tilt[1]:g}]                   # as the camera says",
+        "    pan_dead_arc: [179, 186]                # not measured: what siblings of this camera have",
+        f"    places: {name}                             # a folder; it is made when the first place is saved",
+        "    # mount, camera_info, markers: see config/apartment.yaml; a scan needs them",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def profile(found: Findings) -> str:
+    """The firmware as switches of the simulated camera."""
+    lines = [
+        f"# {found.model} {found.firmware} as it was seen; not found out: {', '.join(found.unknown) or 'nothing'}."
+    ]
+    lines += ["simulators:", "  camera:", "    switches:"]
+    lines += [f"      {key}: {json.dumps(value)}" for key, value in switches(found).items()]
+    return "\n".join(lines) + "\n"
+
+
+def switches(found: Findings) -> dict[str, Any]:
+    """What a simulator's profile takes, in its own words."""
+    known = {key: value for key, value in found.switches.items() if value is not None and key not in NOT_SWITCHES}
+    seen = {"model": found.model, "firmware": found.firmware, "built": found.built, **known}
+    if "median" in found.latency_ms:
+        seen["latency_s"] = round(found.latency_ms["median"] / 1000, 3)
+    if "snapshot" in found.latency_ms:
+        seen["snapshot_s"] = round(found.latency_ms["snapshot"] / 1000, 3)
+    return seen
+
+
+def recorded(found: Findings, wire: Wire) -> Mapping[str, str]:
+    """The answers without names, by file name."""
+    clean = anonymous.cleaner(found.serial, found.name, wire.user)
+    files = anonymous.recorded(wire.exchanges, clean)
+    if wire.heard:
+        files["events.txt"] = clean(wire.heard.decode("latin-1"))
+    return files
+
+
+def write(folder: Path, found: Findings, wire: Wire, name: str) -> list[Path]:
+    """Writes all of it; the files, in the order in which a reader wants them."""
+    texts = {
+        f"{name}.yaml": section(found, name, wire.user),
+        "profile.yaml": profile(found),
+        "report.json": json.dumps(found.data(), indent=2) + "\n",
+    }
+    texts |= {f"replies/{file}": text for file, text in recorded(found, wire).items()}
+    written = []
+    for file, text in texts.items():
+        path = folder / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8", newline="")
+        written.append(path)
+    return written

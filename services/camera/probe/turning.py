@@ -1,0 +1,302 @@
+"""What only a moving camera shows, with leave: speeds, delays, directions, honesty of the status, absolute positions.
+
+It moves by some degrees and back again. Whatever happens, a stop is the last command, and it is confirmed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from statistics import median
+
+from services.camera.brands.dahua import ptz
+from services.camera.brands.dahua.replies import read_table
+from services.camera.probe.findings import Findings, Speed
+from services.camera.probe.wire import Exchange, Wire
+from services.camera.requests import Away, Direction, Reading, Refused, Start
+
+LEVELS = (1, 3, 5)  # the middle one of a full table; the fastest would swing far
+SHORT_S, LONG_S = 0.4, 1.2
+STILL_DEG = 0.15  # readings nearer than this are the same
+REST_S = 20.0
+NEAR_DEG = 0.5  # so near to where it was is back
+STEP_DEG = 3.0  # of the try with absolute positions
+COARSE_DEG = 4.0  # the way back begins faster than this
+RETURNS = 15
+FAR_DEG = 12.0  # more than this is not what was asked for
+BACK = {
+    Direction.LEFT: Direction.RIGHT, Direction.RIGHT: Direction.LEFT,
+    Direction.UP: Direction.DOWN, Direction.DOWN: Direction.UP,
+}  # fmt: skip
+AXES = {"pan": Direction.RIGHT, "tilt": Direction.DOWN}
+ZEROS: dict[str, tuple[str, object, object]] = {  # newer forms: firmware that has them takes a zero; then, else
+    "position_relative": ("start&code=Position&arg1=0&arg2=0&arg3=0", "works", "bad-request"),
+    "continuously": ("start&code=Continuously&arg1=0&arg2=0&arg3=0&arg4=1", True, False),
+    "moves": ("moveRelatively&arg1=0&arg2=0&arg3=0", "readings", "none"),
+}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One reading, when it was asked for and came, and the word for it."""
+
+    sent: float
+    received: float
+    reading: Reading
+    word: str
+
+
+@dataclass(frozen=True)
+class Run:
+    """Degrees turned (as the reading tells), seconds between the answers to start and stop, what was read on the way.
+
+    `settled`: seconds from sending the stop until the final reading came.
+    """
+
+    turned: float
+    seconds: float
+    seen: list[Sample]
+    settled: float
+
+
+class Turner:
+    """Turns one camera, always by pairs of start and stop."""
+
+    def __init__(self, wire: Wire, found: Findings) -> None:
+        self.wire, self.found = wire, found
+        self.channel: int = found.switches["ptz_channels"][-1]
+        self.samples: list[tuple[bool, Sample]] = []  # whether it must have been moving
+        self.rates: dict[tuple[str, int], float] = {}
+        self.grows: dict[str, Direction] = {}  # which way the reading grows
+        self.resting: Sample | None = None  # where it stands, as long as nothing was started
+        self.stood_at = 0.0  # when the first of the readings came that show it at rest
+
+    def read(self) -> Sample:
+        """Where it looks."""
+        answer = self.wire.ask(ptz.status(self.channel))
+        word = read_table(answer.text).get("status.MoveStatus", "")
+        return Sample(answer.sent, answer.sent + answer.seconds, ptz.read_status(answer.text), word)
+
+    def rest(self) -> Sample:
+        """Reads until three readings are equal."""
+        last, equal, end = self.read(), 0, self.wire.clock() + REST_S
+        self.stood_at = last.received
+        while equal < 2:
+            self.wire.pause(max(0.0, 0.2 - (last.received - last.sent)))
+            now = self.read()
+            equal = equal + 1 if apart(last.reading, now.reading) < STILL_DEG else 0
+            self.stood_at = self.stood_at if equal else now.received
+            last = now
+            if self.wire.clock() > end:
+                raise Away("the camera does not come to rest")
+        self.samples.append((False, last))
+        self.resting = last
+        return last
+
+    @contextmanager
+    def turning(self, direction: Direction, speed: int) -> Iterator[Exchange]:
+        """Runs as long as the block does; the stop is sent until it is confirmed."""
+        try:
+            started = self.wire.ask(ptz.start(Start(direction, speed, speed), self.channel), "start")
+            self.resting = None
+            if not started.good:
+                raise Refused(f"the camera refuses to turn: {started.status} {started.text[:60]!r}")
+            yield started
+        finally:
+            self.stop(direction)
+
+    def stop(self, direction: Direction) -> None:
+        """Ends that motion for sure."""
+        for _ in range(20):
+            if self.wire.ask(ptz.stop(direction, self.channel), "stop").good:
+                return
+            self.wire.pause(0.2)
+        raise Away("the camera does not confirm a stop: it may still be turning")
+
+    def run(self, direction: Direction, speed: int, seconds: float) -> Run:
+        """Turns for so long after the answer to the start, and comes to rest."""
+        before = (self.resting or self.rest()).reading
+        seen: list[Sample] = []
+        with self.turning(direction, speed) as started:
+            begun_at = started.sent + started.seconds
+            while (left := begun_at + seconds - self.wire.clock()) > 0:
+                if seconds > SHORT_S:
+                    seen.append(self.read())
+                self.wire.pause(min(0.05, max(0.0, left)))
+        stopped = self.wire.exchanges[-1]
+        after = self.rest()
+        self.samples += [(True, one) for one in moving(seen)]
+        turned = difference(before, after.reading)[0 if direction.value[0] else 1]
+        return Run(turned, stopped.sent + stopped.seconds - begun_at, seen, self.stood_at - stopped.sent)
+
+
+def moving(seen: list[Sample]) -> list[Sample]:
+    """The samples between two others that differ: the camera moved when they were read."""
+    return [
+        now for before, now, after in zip(seen, seen[1:], seen[2:], strict=False)
+        if apart(before.reading, now.reading) > STILL_DEG and apart(now.reading, after.reading) > STILL_DEG
+    ]  # fmt: skip
+
+
+def difference(one: Reading, other: Reading) -> tuple[float, float]:
+    """Degrees of pan and tilt from one to the other, the short way."""
+    return (other.pan - one.pan + 180.0) % 360.0 - 180.0, other.tilt - one.tilt
+
+
+def apart(one: Reading, other: Reading) -> float:
+    """The larger of both, and of zoom levels."""
+    pan, tilt = difference(one, other)
+    return max(abs(pan), abs(tilt), abs(one.zoom - other.zoom))
+
+
+def turn(wire: Wire, found: Findings) -> None:
+    """All of it, and back to where it looked."""
+    turner = Turner(wire, found)
+    home = turner.rest().reading
+    found.moved = True
+    try:
+        for axis, direction in AXES.items():
+            _speeds(turner, axis, direction)
+        _honesty(turner)
+        _absolute(turner)
+    finally:
+        _home(turner, home)
+    for switch, (action, works, otherwise) in ZEROS.items():
+        answer = wire.ask(f"/cgi-bin/ptz.cgi?channel={turner.channel}&action={action}", f"{switch} of zero")
+        found.switches[switch] = works if _done(answer) else otherwise
+    _nowhere(turner)
+
+
+def _done(answer: Exchange) -> bool:
+    return answer.status == 200 and answer.text.split()[:1] == ["OK"]
+
+
+def _nowhere(turner: Turner) -> None:
+    """What it says when it is sent to a preset that nobody has stored: it stays where it is."""
+    most, stored = turner.found.capabilities.get("presets", 1), turner.found.capabilities.get("presets_stored", [])
+    number = next((number for number in range(most, 0, -1) if number not in stored), None)
+    if number is not None:
+        answer = turner.wire.ask(ptz.preset("GotoPreset", number, turner.channel), "preset that is not stored")
+        turner.found.switches["unset_preset"] = "ok" if _done(answer) else "error"
+    turner.rest()
+
+
+def _speeds(turner: Turner, axis: str, direction: Direction) -> None:
+    """Two runs at each level, there and a longer one back: their difference holds no delays."""
+    starts: list[float] = []
+    for level in LEVELS:
+        turner.wire.tell(f"{axis} at speed {level}")
+        first = turner.run(direction, level, SHORT_S)
+        if abs(first.turned) < STILL_DEG:
+            direction = BACK[direction]  # it stands at an end stop
+            first = turner.run(direction, level, SHORT_S)
+        second = turner.run(BACK[direction], level, LONG_S)
+        rate = (abs(second.turned) - abs(first.turned)) / max(second.seconds - first.seconds, 0.1)
+        turner.rates[axis, level] = rate
+        turner.grows[axis] = direction if first.turned > 0 else BACK[direction]
+        turner.found.speeds.append(Speed(axis, level, round(rate, 2)))
+        starts += begun(second.seen, rate)
+        turner.found.delays_s[f"{axis}_stop"] = round(second.settled, 2)
+    if starts:
+        turner.found.delays_s[f"{axis}_start"] = round(median(starts), 2)
+    if axis == "pan":
+        _sense(turner)
+    else:
+        shares = [turner.rates["tilt", level] / max(turner.rates["pan", level], 0.1) for level in LEVELS[1:]]
+        turner.found.switches["tilt_share"] = round(median(shares), 2)
+
+
+def begun(seen: list[Sample], rate: float) -> list[float]:
+    """Seconds from the answer to a start until the reading changes, by a straight line through a sample. Pure."""
+    on = moving(seen)
+    if not on or rate < 2.0:
+        return []  # too slow for tenths of degrees to tell
+    at = (on[-1].sent + on[-1].received) / 2 - apart(seen[0].reading, on[-1].reading) / rate
+    return [max(0.0, at - seen[0].sent)]
+
+
+def _sense(turner: Turner) -> None:
+    """Right decreases the reading in a picture that is not mirrored; firmware may swap that with the picture."""
+    if turner.found.picture.get("mirror"):
+        turner.found.switches["mirror_inverts_motors"] = turner.grows["pan"] is Direction.RIGHT
+    else:
+        turner.found.unknown["mirror_inverts_motors"] = "the picture is not mirrored, and the probe changes no setting"
+
+
+def _honesty(turner: Turner) -> None:
+    """What the status says of moving, against what the readings show."""
+    if turner.found.switches.get("status_form") == "c":
+        turner.found.unknown["move_status"] = "its status has no word for it"
+        return
+    resting = {one.word for moves, one in turner.samples[1:] if not moves}  # it may be honest until it first moves
+    turning = {one.word for moves, one in turner.samples if moves}
+    if resting == {"Moving"}:
+        turner.found.switches["move_status"] = "stuck"
+    elif not turning:
+        turner.found.unknown["move_status"] = "too slow to be seen on the way"
+    else:
+        turner.found.switches["move_status"] = "honest" if "Moving" in turning else "always-idle"
+
+
+def _absolute(turner: Turner) -> None:
+    """A few degrees aside by PositionABS, whose first argument is the travel, and back by the same."""
+    turner.wire.tell("an absolute position")
+    here = turner.rest().reading
+    aside = 1.0 if (here.pan + 180.0) % 360.0 < 180.0 else -1.0  # away from the dead arc
+    down = 1.0 if here.tilt < 50.0 else -1.0
+    goal = Reading((here.pan - aside * STEP_DEG) % 360.0, here.tilt + down * STEP_DEG, here.zoom)
+    answer = _go(turner, goal)
+    if not answer.good:
+        turner.found.switches["position_abs"] = "bad-request"
+        return
+    pan, tilt = difference(here, _watched(turner, here).reading)
+    honest = abs(abs(pan) - STEP_DEG) < 1.0
+    level = abs(abs(tilt) - STEP_DEG) < 2.5 and abs(tilt) > 0.5
+    if honest:
+        turner.found.switches["position_abs"] = "full" if level else "pan-only"
+        beside = round(tilt - down * STEP_DEG, 1)
+        turner.found.switches["position_abs_tilt_off"] = beside if level and abs(beside) > 2 * STILL_DEG else 0.0
+    else:
+        turner.found.unknown["position_abs"] = f"taken, but it turned by {pan:.1f}, {tilt:.1f} degrees instead of 3, 3"
+    _go(turner, here)
+    _watched(turner, here)
+
+
+def _go(turner: Turner, goal: Reading) -> Exchange:
+    arguments = f"arg1={(180.0 - goal.pan) % 360.0:.1f}&arg2={goal.tilt:.1f}&arg3={goal.zoom:.0f}"
+    target = f"/cgi-bin/ptz.cgi?action=start&channel={turner.channel}&code=PositionABS&{arguments}"
+    turner.resting = None
+    return turner.wire.ask(target, "PositionABS")
+
+
+def _watched(turner: Turner, origin: Reading) -> Sample:
+    """Comes to rest; a camera that goes far away instead is stopped."""
+    for _ in range(100):
+        before, now = turner.read(), turner.read()
+        if max(map(abs, difference(origin, now.reading))) > FAR_DEG:
+            turner.wire.ask(
+                f"/cgi-bin/ptz.cgi?action=stop&channel={turner.channel}&code=PositionABS&arg1=0&arg2=0&arg3=0"
+            )
+            break
+        if apart(before.reading, now.reading) < STILL_DEG:
+            break
+        turner.wire.pause(0.1)
+    return turner.rest()
+
+
+def _home(turner: Turner, home: Reading) -> None:
+    """Back to where it looked, axis by axis, by runs that are a little too short."""
+    turner.wire.tell("back to where it looked")
+    lag = turner.found.latency_ms.get("median", 300.0) / 1000
+    for _ in range(RETURNS):
+        errors = dict(zip(AXES, difference((turner.resting or turner.rest()).reading, home), strict=True))
+        axis, error = max(errors.items(), key=lambda item: abs(item[1]))
+        if abs(error) <= NEAR_DEG:
+            return
+        level = LEVELS[1] if abs(error) > COARSE_DEG else LEVELS[0]
+        rate = max(turner.rates.get((axis, level), 0.6 * level), 0.3)
+        grows = turner.grows.get(axis, AXES[axis])
+        seconds = 0.9 * abs(error) / rate - lag
+        turner.run(grows if error > 0 else BACK[grows], level, min(max(seconds, 0.02), 3.0))
+    turner.found.notes.append("the camera looks a little beside where it looked before")

@@ -1,0 +1,1 @@
+"""Sound: recordings from the camera's microphone, and files for its loudspeaker."""

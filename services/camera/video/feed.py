@@ -1,0 +1,149 @@
+"""What the video wants from the camera's own connection, as plans: where the stream is, and snapshots.
+
+Snapshots are taken on request, at motion and every so often where that is configured, and for those who look while no
+stream flows.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import cast
+
+from services.bus import Message
+from services.camera import orders
+from services.camera.health import Health
+from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.requests import Away, FindStream, Picture, Refused, Reply, Snapshot, StreamAddress
+from services.camera.settings import Config
+from services.camera.video.channel import Channel
+from services.camera.video.newest import Upright
+from services.errors import DeviceError
+from services.topics import CAMERA_SNAPSHOT
+
+START_S = 15.0  # an order to switch on fails when no picture has come until then
+STEP_S = 0.1
+IDLE_S = 1.0
+RETRY_S = 10.0  # after a camera would not tell where its stream is
+
+log = logging.getLogger(__name__)
+
+
+class Feed:
+    """Makes the plans. `channel` None: no moving pictures here (virtual time)."""
+
+    def __init__(self, config: Config, health: Health, channel: Channel | None, say: Callable[[Message], None]) -> None:
+        self.config = config
+        self.health = health
+        self.channel = channel
+        self.upright = Upright(config.picture.flip, config.picture.mirror, config.kind)
+        self.say = say
+        self._shooting = False
+
+    def check(self, order: orders.Broadcast) -> None:
+        """Refused when nothing could be switched on; off is possible while the camera is away too."""
+        self._channel()
+        if (order.rtsp or order.mjpeg) and not self.health.online:
+            raise Refused(f"the camera is {self.health.state}: {self.health.reason}")
+
+    def switch(self, order: orders.Broadcast, now: float) -> Plan[None]:
+        """RTSP and MJPEG, on or off. On is done when a picture is there; without one it is as it was."""
+        channel = self._channel()
+        before = channel.rtsp, channel.mjpeg
+        if not (order.rtsp or order.mjpeg):
+            return channel.switch(rtsp=order.rtsp, mjpeg=order.mjpeg)
+        channel.open()
+        if not channel.url:
+            raise Refused("the port of the stream is taken: see stream.port in the configuration")
+        channel.switch(rtsp=order.rtsp, mjpeg=order.mjpeg)
+        try:
+            yield from self._first_picture(channel, order, now)
+        except DeviceError:
+            channel.switch(rtsp=before[0] if order.rtsp else None, mjpeg=before[1] if order.mjpeg else None)
+            raise
+        return None
+
+    def run(self, now: float) -> Plan[None]:
+        """As long as the service: finds the stream when it is wanted, feeds those who look while none flows."""
+        while (channel := self.channel) is not None:
+            now = yield from wait(now + (STEP_S if channel.starving else IDLE_S))
+            if not channel.on or not self.health.online:
+                continue
+            if channel.found is None:
+                now = yield from self._find(channel)
+                if channel.found is None:
+                    now = yield from wait(now + RETRY_S)
+            elif channel.starving:
+                now = (yield from self._shoot(channel)).received
+                now = yield from wait(now + self.config.stream.snapshot_every_s)
+
+    def shown(self) -> Plan[None]:
+        """A snapshot for somebody at the proxy."""
+        if self.channel is not None and self.health.online and not self._shooting:
+            yield from self._shoot(self.channel)
+
+    def published(self) -> Plan[None]:
+        """A snapshot for the bus, upright; DeviceError when there is none."""
+        reply = yield from ask(Snapshot())
+        data = self.upright.jpeg(cast(bytes, reply.result))
+        self.say(CAMERA_SNAPSHOT.message(data, cam=self.config.name))
+
+    def at_motion(self) -> Plan[None]:
+        """A snapshot because something has begun to move; nothing where that is not configured."""
+        if self.config.snapshot.at_motion and self.health.online:
+            yield from self.published()
+
+    def every_so_often(self, now: float) -> Plan[None]:
+        """As long as the service: snapshots at the configured distance, while the camera is there and at rest."""
+        while (every := self.config.snapshot.every_s) is not None:
+            now = yield from wait(now + every)
+            if self.health.online and not self.health.moving:
+                try:
+                    yield from self.published()
+                except DeviceError as error:
+                    log.info("%s: no snapshot this time: %s", self.config.name, error)
+
+    def turned(self, picture: Picture) -> None:
+        """The camera delivers its pictures in another way from now on."""
+        self.upright = Upright(picture.flip, picture.mirror, self.upright.kind)
+        if self.channel is not None:
+            self.channel.newest.upright = self.upright
+
+    def _channel(self) -> Channel:
+        if self.channel is None:
+            raise Refused("not available: there is no moving picture here")
+        return self.channel
+
+    def _first_picture(self, channel: Channel, order: orders.Broadcast, now: float) -> Plan[None]:
+        until = now + START_S
+        while not channel.flows:
+            now = yield from wait(now + STEP_S)
+            if (order.rtsp and not channel.rtsp) or (order.mjpeg and not channel.mjpeg):
+                raise Refused("it was switched off again")
+            if channel.found is None:
+                now = yield from self._find(channel)
+            elif not channel.hopeful:
+                reply = yield from self._shoot(channel)
+                if reply.error is None:
+                    return
+                now = yield from wait(reply.received + IDLE_S)
+            if now > until:
+                raise Away(channel.complaint() or f"no picture has come within {START_S:.0f} s")
+
+    def _find(self, channel: Channel) -> Plan[float]:
+        reply = yield from attempt(FindStream(self.config.stream.source))
+        if isinstance(reply.result, StreamAddress):
+            channel.begin(reply.result)
+        elif reply.error is None or isinstance(reply.error, Refused):
+            channel.begin(StreamAddress(None))
+        return reply.received
+
+    def _shoot(self, channel: Channel) -> Plan[Reply]:
+        self._shooting = True
+        try:
+            reply = yield from attempt(Snapshot())
+        finally:
+            self._shooting = False
+        if reply.error is None:
+            channel.show(cast(bytes, reply.result), reply.sent, reply.received)
+        return reply

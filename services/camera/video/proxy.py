@@ -1,0 +1,242 @@
+"""Our own stream: the newest picture for everybody who may look, as multipart JPEG, and one picture at a time.
+
+    /camera/<cam>/stream.mjpg     while RTSP or MJPEG is on
+    /camera/<cam>/snapshot.jpg    always: the newest picture, or a snapshot taken for it
+
+No credentials: loopback and the configured networks may look, all others get 403. Nothing else is served. The standard
+library's threading server does: a viewer is a loop that waits for a picture and writes it, and a thread each makes a
+slow one nobody else's trouble; it skips pictures, because it takes the newest one whenever it is ready.
+"""
+
+from __future__ import annotations
+
+import logging
+import select
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from ipaddress import ip_address
+from socketserver import TCPServer
+from threading import BoundedSemaphore, Thread
+from time import monotonic
+from typing import Any
+from urllib.parse import urlsplit
+
+from services.camera.video.newest import Newest
+from services.camera.video.settings import Network, StreamSettings
+
+BOUNDARY = "picture"
+STALLED_S = 10.0  # a viewer that takes nothing for so long is gone
+QUIET_S = 2.0  # between two looks whether a viewer is still there, while no picture comes
+SNAPSHOT_S = 22.0  # the camera may take 20 s
+FRESH_S = 2.0  # a picture as old as this is still the newest one
+SEND_BUFFER = 256 * 1024  # bytes; with more a slow viewer sees what was long ago
+POLL_S = 0.2  # how long the port may take to notice that it is to close
+STRICT = (
+    ("Cache-Control", "no-store, no-cache, must-revalidate, max-age=0"),
+    ("Pragma", "no-cache"),
+    ("X-Content-Type-Options", "nosniff"),
+    ("Content-Security-Policy", "default-src 'none'"),
+    ("Referrer-Policy", "no-referrer"),
+)
+
+log = logging.getLogger(__name__)
+
+
+class Proxy(ThreadingHTTPServer):
+    """The port. `on()`: whether the stream is switched on; `ask()` asks for a snapshot, which will come into the slot.
+
+    OSError when it cannot listen there.
+    """
+
+    daemon_threads = False  # they end by themselves: see close
+    request_queue_size = 32
+
+    def __init__(
+        self, camera: str, settings: StreamSettings, newest: Newest, on: Callable[[], bool], ask: Callable[[], None]
+    ) -> None:
+        self.address_family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+        super().__init__((settings.host, settings.port), Viewer)
+        self.settings, self.newest, self.on, self.ask = settings, newest, on, ask
+        self.stream_path = f"/camera/{camera}/stream.mjpg"
+        self.snapshot_path = f"/camera/{camera}/snapshot.jpg"
+        self.names = _own_names(settings)
+        self.seats = BoundedSemaphore(settings.viewers)
+        self.doors = BoundedSemaphore(2 * settings.viewers + 8)  # connections that have not said what they want, too
+        self._open: set[socket.socket] = set()
+        self.closing = False
+        self._thread = Thread(target=self.serve_forever, args=(POLL_S,), name="camera proxy", daemon=True)
+        self._thread.start()
+
+    def server_bind(self) -> None:
+        """Binds; asks no name server for its own name."""
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
+
+    def may_look(self, address: str) -> bool:
+        """Whether somebody there may look."""
+        known = ip_address(address.partition("%")[0])
+        known = getattr(known, "ipv4_mapped", None) or known
+        return known.is_loopback or any(_within(known, network) for network in self.settings.allow)
+
+    def knows(self, host: str) -> bool:
+        """Whether a request's Host is us: a page elsewhere that gave its own name our address may not read pictures."""
+        name = (urlsplit(f"//{host}").hostname or "").rstrip(".")
+        try:
+            ip_address(name)
+        except ValueError:
+            return name in self.names
+        return True
+
+    def verify_request(self, request: Any, client_address: Any) -> bool:
+        """More connections than there are doors are closed without a word."""
+        return self.doors.acquire(blocking=False)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """One connection."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self.doors.release()
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Remembers the connection, so that it can be ended."""
+        self._open.add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """The connection is over."""
+        self._open.discard(request)
+        super().shutdown_request(request)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A viewer that went away is none of our concern; anything else is a bug, and told."""
+        log.debug("a viewer at %s broke off", client_address[0], exc_info=True)
+
+    def close(self) -> None:
+        """Ends the port and every viewer."""
+        self.closing = True
+        self.newest.close()
+        self.shutdown()
+        self._thread.join()
+        for connection in list(self._open):
+            with suppress(OSError):  # it was about to end by itself
+                connection.shutdown(socket.SHUT_RDWR)
+        self.server_close()
+
+
+class Viewer(BaseHTTPRequestHandler):
+    """One connection of one who looks."""
+
+    server: Proxy
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = "apartment", ""
+    timeout = STALLED_S
+
+    def setup(self) -> None:
+        """A small buffer: pictures wait here, not in the network."""
+        self.request.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+        super().setup()
+
+    def do_GET(self) -> None:
+        """Looks."""
+        self.close_connection = True
+        path = urlsplit(self.path).path
+        if not self.server.may_look(str(self.client_address[0])) or not self.server.knows(self.headers["Host"] or ""):
+            self._refuse(HTTPStatus.FORBIDDEN, "this address may not look: see stream.allow in the configuration")
+        elif path not in (self.server.stream_path, self.server.snapshot_path):
+            self._refuse(HTTPStatus.NOT_FOUND, f"there are {self.server.stream_path} and {self.server.snapshot_path}")
+        elif not self.server.seats.acquire(blocking=False):
+            self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "too many viewers", ("Retry-After", "5"))
+        else:
+            try:
+                self._stream() if path == self.server.stream_path else self._snapshot()
+            finally:
+                self.server.seats.release()
+
+    def do_HEAD(self) -> None:
+        """The same without pictures."""
+        self.do_GET()
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """What the standard library refuses: broken requests, and methods that are not looking."""
+        self.close_connection = True
+        if code == HTTPStatus.NOT_IMPLEMENTED:
+            self._refuse(HTTPStatus.METHOD_NOT_ALLOWED, "there is nothing to do but look", ("Allow", "GET, HEAD"))
+        else:
+            self._refuse(HTTPStatus(code), "not a request that is understood here")
+
+    def _stream(self) -> None:
+        if not self.server.on():
+            return self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "the stream is off: order RTSP or MJPEG")
+        self._head(HTTPStatus.OK, ("Content-Type", f"multipart/x-mixed-replace; boundary={BOUNDARY}"))
+        if self.command == "HEAD":
+            return None
+        with self.server.newest.watched():
+            self._pictures()
+        return None
+
+    def _pictures(self) -> None:
+        """The boundary follows each picture at once: a browser shows it when it knows where it ends."""
+        self.wfile.write(f"--{BOUNDARY}\r\n".encode())
+        number, step, due = 0, 1 / self.server.settings.fps, monotonic()
+        while self.server.on() and not self.server.closing and not self._gone(max(0.0, due - monotonic())):
+            found = self.server.newest.jpeg(number, QUIET_S)
+            if found is None:
+                continue
+            number, data = found
+            due = max(due + step, monotonic())
+            head = f"Content-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
+            self.wfile.write(head.encode() + data + f"\r\n--{BOUNDARY}\r\n".encode())
+
+    def _gone(self, within_s: float) -> bool:
+        """Whether the viewer has ended the connection, or does in that time."""
+        readable, _, _ = select.select([self.connection], [], [], within_s)
+        return bool(readable) and self.connection.recv(1024) == b""
+
+    def _snapshot(self) -> None:
+        found = self._newest()
+        if found is None:
+            return self._refuse(HTTPStatus.GATEWAY_TIMEOUT, "the camera gives no picture", ("Retry-After", "5"))
+        self._head(HTTPStatus.OK, ("Content-Type", "image/jpeg"), ("Content-Length", str(len(found))))
+        if self.command != "HEAD":
+            self.wfile.write(found)
+        return None
+
+    def _newest(self) -> bytes | None:
+        newest = self.server.newest
+        frame = newest.frame
+        with newest.watched():
+            if frame is None or not newest.fresh(FRESH_S):
+                self.server.ask()
+                found = newest.jpeg(frame.number if frame else 0, SNAPSHOT_S)
+            else:
+                found = newest.jpeg(frame.number - 1, SNAPSHOT_S)
+        return found[1] if found else None
+
+    def _refuse(self, status: HTTPStatus, why: str, *more: tuple[str, str]) -> None:
+        body = f"{status.value} {status.phrase}: {why}\n".encode()
+        self._head(status, ("Content-Type", "text/plain; charset=utf-8"), ("Content-Length", str(len(body))), *more)
+        if self.command != "HEAD":
+            self.wfile.write(body)
+
+    def _head(self, status: HTTPStatus, *headers: tuple[str, str]) -> None:
+        self.send_response(status)
+        for name, value in (*headers, *STRICT, ("Connection", "close")):
+            self.send_header(name, value)
+        self.end_headers()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Who looks at what is nobody's business."""
+
+
+def _within(address: Any, network: Network) -> bool:
+    return address.version == network.version and address in network
+
+
+def _own_names(settings: StreamSettings) -> frozenset[str]:
+    own = socket.gethostname().lower()
+    told = urlsplit(settings.url).hostname if settings.url else None
+    return frozenset(name for name in ("localhost", own, f"{own.partition('.')[0]}.local", settings.host, told) if name)

@@ -1,0 +1,101 @@
+"""Dahua's endless answers, which Amcrest gives too: the event stream and sound, both ways.
+
+What the bytes mean is in `brands/dahua/` and `sound/`; who starts them, and again, in `alarm/` and `sound/desk.py`.
+"""
+
+from __future__ import annotations
+
+import secrets
+import threading
+from collections.abc import Iterator
+
+import httpx
+
+from services.camera.address import Address
+from services.camera.brands.dahua import events, replies, system
+from services.camera.requests import Away, Event, Refused
+from services.camera.sound import g711
+from services.camera.web.connection import connection, fetch
+from services.camera.web.digest import Login, header, read_challenge
+from services.camera.web.endless import Endless
+from services.camera.web.gate import Gate
+from services.camera.web.upload import upload
+
+BEATS = 3.25  # so many heartbeats of silence are the end: three were missed, and one may be late
+SOUND_SILENCE_S = 6.0
+LATE_S = 10.0  # a recording that takes so much longer than it is has hung
+RECEIVE = "/cgi-bin/audio.cgi?action=getAudio&httptype=singlepart&channel=1"  # 1-based whatever the motors want
+SEND = "/cgi-bin/audio.cgi?action=postAudio&httptype=singlepart&channel=1"
+CODECS = {"g.711a": g711.A_LAW, "g.711mu": g711.MU_LAW}
+
+
+class DahuaEar:
+    """An Ear (`alarm/listener.py`)."""
+
+    def __init__(self, address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> None:
+        self._endless = Endless(address, gate, BEATS * heartbeat_s)
+        self._target = events.attach(codes, heartbeat_s)
+
+    def listen(self) -> Iterator[list[Event]]:
+        """See `Ear`."""
+        with self._endless.open(self._target) as (response, pieces):
+            _must_be_endless(response)
+            parser = events.Parser(events.boundary(response.headers.get("content-type", "")))
+            yield []
+            for piece in pieces:
+                yield parser.feed(piece)
+
+    def close(self) -> None:
+        """See `Ear`."""
+        self._endless.close()
+
+
+class DahuaSound:
+    """A Sound (`sound/desk.py`)."""
+
+    def __init__(self, address: Address, gate: Gate) -> None:
+        self._address, self._gate = address, gate
+
+    def record(self, seconds: float, ended: threading.Event) -> g711.Samples:
+        """See `Sound`."""
+        endless = Endless(self._address, self._gate, SOUND_SILENCE_S)
+        wanted, data = round(seconds * g711.RATE), bytearray()
+        with endless.open(RECEIVE) as (response, pieces):
+            _must_be_endless(response)
+            codec = response.headers.get("content-type", "").partition(";")[0].strip().lower().removeprefix("audio/")
+            if codec not in CODECS:
+                raise Refused(f"the camera's sound is {codec[:40]!r}; set its audio to G.711A at 8000 Hz")
+            for piece in pieces:
+                data += piece
+                if len(data) >= wanted or ended.is_set():
+                    return g711.decode(bytes(data[:wanted]), CODECS[codec])
+        raise Away(f"the camera ended its sound after {len(data) / g711.RATE:.1f} s")
+
+    def play(self, data: bytes, ended: threading.Event) -> None:
+        """See `Sound`. A small request first shows that the login is right; another gets a nonce that is new."""
+        login = Login(self._address.user, self._address.password, self._gate)
+        small = system.magic("getDeviceType")
+        head = {"Content-Type": "Audio/G.711A", "Connection": "close"}
+        with connection(self._address, login) as http:
+            replies.check(fetch(http, small))
+            challenges = _bare(http, small).headers.get_list("www-authenticate")
+        if (challenge := read_challenge(challenges)) is not None:
+            secret = self._address.password.get_secret_value()
+            user, cnonce = self._address.user, secrets.token_hex(8)
+            head["Authorization"] = header(challenge, user, secret, "POST", SEND, cnonce)
+        upload(self._address.url, head, SEND, data, g711.RATE, self._gate, ended)
+
+
+def _must_be_endless(response: httpx.Response) -> None:
+    """Raises what a short answer means."""
+    if response.is_closed:
+        replies.check(response)
+        raise Away("the camera gave a short answer where an endless one was asked for")
+
+
+def _bare(http: httpx.Client, target: str) -> httpx.Response:
+    """The answer to a request without credentials."""
+    try:
+        return http.get(target, auth=None)
+    except httpx.HTTPError as error:
+        raise Away(f"no answer from the camera: {type(error).__name__} {error}".strip()) from error

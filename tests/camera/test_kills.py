@@ -1,0 +1,42 @@
+"""What happens to a motion when somebody dies in the middle of it: real processes, kill -9, a network that is cut."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from services import peers
+from tests.camera import trials
+from tests.small_flat import SmallFlat, small_flat
+
+pytestmark = pytest.mark.mosquitto
+
+
+@pytest.fixture(scope="module")
+def flat(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SmallFlat]:
+    try:
+        with small_flat(tmp_path_factory.mktemp("flat"), networked=True) as running:
+            yield running
+    except peers.Missing as missing:
+        pytest.skip(str(missing))
+
+
+def test_the_motor_stands_still_soon_after_the_service_was_killed(flat: SmallFlat) -> None:
+    assert trials.kill_service(flat) < trials.STOPPED_S
+
+
+def test_the_motor_stands_still_soon_after_the_supervisor_was_killed_and_nobody_is_left(flat: SmallFlat) -> None:
+    assert trials.kill_supervisor(flat) < trials.STOPPED_S
+
+
+def test_the_motor_stands_still_soon_after_the_broker_was_killed(flat: SmallFlat) -> None:
+    assert trials.kill_broker(flat) < trials.STOPPED_S
+
+
+def test_after_the_network_was_cut_a_stop_is_the_first_that_reaches_the_camera(flat: SmallFlat) -> None:
+    assert trials.cut_network(flat) < trials.REACHED_S
+
+
+def test_the_same_when_it_was_cut_for_longer(flat: SmallFlat) -> None:
+    assert trials.cut_network(flat, seconds=4.0) < trials.REACHED_S

@@ -1,0 +1,206 @@
+"""The motion alarm's meaning: 1 for a while after motion, -1 in trouble, masked while the camera itself turns."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from services.camera.alarm.listener import Heard
+from services.camera.alarm.motion import MotionWatch
+from services.camera.errands import GetMotion
+from services.camera.plan import Plan, Run, Stage
+from services.camera.requests import Away, Event, Refused, Reply, Request
+from services.errors import DeviceError
+
+START, STOP, BEAT = Event("VideoMotion", "Start"), Event("VideoMotion", "Stop"), Event("", "Heartbeat")
+
+
+class Room:
+    """A MotionWatch, a camera that answers whether motion is going on (or an error), and a clock that jumps."""
+
+    def __init__(self, *, on: bool = True) -> None:
+        self.now = 1000.0
+        self.goes_on: bool | DeviceError = False
+        self.asked: list[float] = []
+        self.said: list[tuple[float, int]] = []
+        self.turning = False
+        self.waiting: list[tuple[Request, int]] = []
+        self.stage = Stage(lambda request, ticket: self.waiting.append((request, ticket)))
+        self.watch = MotionWatch(self.begin, ("VideoMotion",), 15.0, on=on)
+
+    def begin(self, plan: Plan[None], now: float) -> None:
+        self.stage.begin(plan, now, lambda run, now: None)
+
+    def hear(self, *events: Event, attached: bool = False, lost: str | None = None, silent: bool = False,
+             mute: bool = False) -> None:  # fmt: skip
+        self.watch.take(Heard(self.now, events, attached, lost, silent, mute))
+        self.step()
+
+    def run(self, seconds: float, events: Sequence[Event] = ()) -> None:
+        """Time passes in steps of half a second; `events` come every 4 s."""
+        for number in range(round(2 * seconds)):
+            self.now += 0.5
+            if events and number % 8 == 7:
+                self.watch.take(Heard(self.now, tuple(events)))
+            self.step()
+
+    def step(self) -> None:
+        said = self.watch.tick(self.now, turning=self.turning)
+        if said is not None and (not self.said or self.said[-1][1] != said.value):
+            self.said.append((self.now, said.value))
+        while self.waiting:
+            request, ticket = self.waiting.pop()
+            assert isinstance(request, GetMotion)
+            self.asked.append(self.now)
+            error = self.goes_on if isinstance(self.goes_on, DeviceError) else None
+            self.stage.reply(Reply(request, ticket, self.goes_on if error is None else None, error, 0, self.now),
+                             self.now)  # fmt: skip
+            self.step()
+
+    @property
+    def values(self) -> list[int]:
+        return [value for _, value in self.said]
+
+    def attached(self) -> Room:
+        self.hear(attached=True)
+        self.run(1)
+        return self
+
+
+def test_motion_is_1_until_15_s_after_its_end() -> None:
+    room = Room().attached()
+    room.hear(START)
+    began = room.now
+    room.run(3)
+    room.hear(STOP)
+    room.run(30)
+    assert room.said[1:] == [(began, 1), (began + 18.0, 0)]
+
+
+def test_since_tells_when_the_value_began() -> None:
+    room = Room().attached()
+    room.hear(START)
+    said = room.watch.tick(room.now, turning=False)
+    assert said is not None
+    assert json.loads(said.model_dump_json()) == {"value": 1, "since": "1970-01-01T00:16:41.000Z"}
+
+
+def test_a_lost_stop_ends_by_asking_the_camera() -> None:
+    room = Room().attached()
+    room.hear(START)
+    room.run(20, [BEAT])
+    assert room.values == [0, 1, 0]
+
+
+def test_somebody_who_stays_keeps_it_at_1() -> None:
+    room = Room().attached()
+    room.goes_on = True
+    room.hear(START)
+    room.run(120, [BEAT])
+    assert room.values == [0, 1]
+    assert len(room.asked) < 12
+    room.goes_on = False
+    room.run(31)
+    assert room.values == [0, 1, 0]
+
+
+def test_what_the_camera_sees_while_it_turns_is_no_motion_and_for_2_s_after() -> None:
+    room = Room().attached()
+    room.turning = True
+    room.run(1)
+    room.hear(START)
+    room.turning = False
+    room.run(1)
+    room.hear(STOP)
+    room.hear(START)
+    room.run(5)
+    assert (room.values, room.watch.masked) == ([0], 2)
+    room.hear(START)
+    assert room.values == [0, 1]
+
+
+def test_motion_from_before_a_turn_still_counts() -> None:
+    room = Room().attached()
+    room.hear(START)
+    room.turning = True
+    room.run(5)
+    assert room.values == [0, 1]
+
+
+def test_after_a_reconnect_the_camera_is_asked_whether_motion_is_going_on() -> None:
+    room = Room().attached()
+    room.hear(lost="the connection broke")
+    room.goes_on = True
+    room.run(1)
+    room.hear(attached=True)
+    assert room.values == [0, 1]
+
+
+def test_a_short_break_is_no_trouble_and_a_longer_one_is() -> None:
+    room = Room().attached()
+    room.hear(lost="the connection broke")
+    room.run(2)
+    room.hear(attached=True)
+    room.hear(lost="the connection broke")
+    assert room.values == [0]
+    room.run(4)
+    assert room.values == [0, -1]
+    assert room.watch.fact == "lost: the connection broke"
+    room.hear(attached=True)
+    assert room.values == [0, -1, 0]
+
+
+def test_a_stream_that_fell_silent_is_in_trouble_until_it_gives_a_sign_of_life() -> None:
+    room = Room().attached()
+    room.hear(BEAT)
+    room.hear(lost="nothing came", silent=True)
+    assert room.values == [0, -1]
+    room.hear(attached=True)
+    room.run(5)
+    assert room.values == [0, -1]
+    room.hear(BEAT)
+    assert room.values == [0, -1, 0]
+
+
+def test_firmware_without_heartbeat_is_asked_instead() -> None:
+    room = Room().attached()
+    room.hear(lost="nothing came", silent=True, mute=True)
+    room.goes_on = True
+    room.run(6)
+    assert room.values == [0, 1]
+    room.hear(attached=True)
+    room.goes_on = False
+    room.run(30)
+    assert room.values == [0, 1, 0]
+    assert 5 <= len(room.asked) <= 10
+    room.goes_on = Away("no answer")
+    room.run(6)
+    assert room.values[-1] == -1
+
+
+def test_nothing_is_said_before_anything_is_known_but_not_for_long() -> None:
+    room = Room()
+    room.run(5)
+    assert room.values == []
+    room.run(6)
+    assert room.values == [-1]
+
+
+def test_a_camera_that_does_not_tell_its_state_is_believed_by_its_events() -> None:
+    room = Room()
+    room.goes_on = Refused("Bad Request")
+    room.attached()
+    room.hear(START)
+    room.run(20)
+    assert room.values == [0, 1, 0]
+
+
+def test_an_alarm_that_is_switched_off_says_so_and_asks_nothing() -> None:
+    room = Room(on=False)
+    room.run(20)
+    assert (room.values, room.asked, room.watch.fact, room.watch.trouble) == ([-1], [], "off", False)
+
+
+def test_a_plan_that_ended_is_forgotten() -> None:
+    room = Room().attached()
+    assert room.stage._runs == list[Run]()

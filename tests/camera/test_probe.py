@@ -1,0 +1,296 @@
+"""`apartment probe` against the simulated camera in every firmware: it finds what the profile says, without harm."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import yaml
+from pydantic import SecretStr
+
+from services.camera.probe import anonymous, paper
+from services.camera.probe.contact import READS, contact
+from services.camera.probe.findings import Findings
+from services.camera.probe.stream import read_events
+from services.camera.probe.wire import Wire
+from services.camera.requests import Away, BadLogin
+from services.config import load
+from services.peers import free_port, wait_until
+from services.simulators import camera as simulated
+from services.simulators.camera.firmwares import PROFILES
+from services.simulators.camera.profiles import Profile
+from tests.camera.bench import PASSWORD, SHIPPED, simulator
+
+LATENCY_S = 0.03
+AT_ONCE = 3
+UNSEEN = {  # switches that cannot be seen from outside, or only by doing harm
+    "boot_s", "drowsy_s", "latency_spread_s", "latency_tail", "lockout_failures", "lockout_of", "lockout_s",
+    "max_connections", "over_limit", "pan_acceleration", "pan_speeds", "snapshot_drop", "spurious_401", "status_lag_s",
+    "stream_slowdown_s", "tilt_acceleration", "zoom_acceleration", "zoom_speed",
+}  # fmt: skip
+MEASURED = {"latency_s": 0.06, "snapshot_s": 2.0, "tilt_share": 0.06}  # how far off they may be on a busy machine
+NO_DIGEST = {"nonce", "challenge_spacing", "digest_algorithms", "qop", "realm"}  # where Basic is all there is
+
+
+class Quiet:
+    """A Teller that says nothing, and lets something move in front of the camera while events are listened to."""
+
+    def __init__(self, camera: simulated.Simulated) -> None:
+        self.camera = camera
+
+    def begin(self, step: str) -> None:
+        if step == "Events":
+            threading.Timer(1.0, self.move).start()
+
+    def move(self) -> None:
+        httpx.post(f"{self.camera.side_door_url}/event", json={"code": "VideoMotion", "action": "Start"})
+
+    def detail(self, text: str) -> None:
+        pass
+
+    def end(self, step: str, found: Findings) -> None:
+        pass
+
+
+@dataclass
+class Meeting:
+    """What the probe found, and what the camera says of the probe."""
+
+    found: Findings
+    files: dict[str, str]
+    state: dict[str, Any]
+    asked: list[str]
+    changes: int
+
+
+def wire_to(camera: simulated.Simulated, password: str = PASSWORD) -> Wire:
+    return Wire(camera.url, "ros", SecretStr(password))
+
+
+def meet(profile: str, may_move: bool) -> Meeting:
+    with simulator(profile=profile, latency_s=LATENCY_S) as camera:
+        wire = wire_to(camera)
+        try:
+            found = contact(wire, Quiet(camera), lambda found: may_move)
+        finally:
+            wire.close()
+        state = httpx.get(f"{camera.side_door_url}/state").json()
+        asked = [entry["target"] for entry in httpx.get(f"{camera.side_door_url}/log").json()]
+        files = dict(paper.recorded(found, wire))
+        return Meeting(found, files, state, asked, camera.server.device.tables.changes)
+
+
+@pytest.fixture(scope="module")
+def meetings() -> Iterator[dict[str, Future[Meeting]]]:
+    """All firmwares, some at once: the probe mostly waits."""
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        yield {name: pool.submit(meet, name, True) for name in PROFILES}
+
+
+@pytest.fixture(params=PROFILES)
+def profile(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def meeting(profile: str, meetings: dict[str, Future[Meeting]]) -> Meeting:
+    return meetings[profile].result()
+
+
+def test_every_switch_that_can_be_seen_is_seen_right(profile: str, meeting: Meeting) -> None:
+    true, seen = asdict(PROFILES[profile]), paper.switches(meeting.found)
+    true["latency_s"] = LATENCY_S
+    wrong = {
+        key: f"{seen[key]!r} is {true[key]!r}" for key in seen
+        if (abs(seen[key] - true[key]) > MEASURED[key] if key in MEASURED else seen[key] != true[key])
+    }  # fmt: skip
+    assert wrong == {}
+
+
+def test_what_it_leaves_open_cannot_be_seen(profile: str, meeting: Meeting) -> None:
+    true = PROFILES[profile]
+    allowed = set(UNSEEN)
+    allowed |= NO_DIGEST if true.auth == "basic" else set()
+    allowed |= {"move_status"} if true.status_form == "c" else set()
+    allowed |= {"unset_preset"} if true.preset_max <= 9 else set()  # all are stored
+    allowed |= set() if true.position_abs == "full" else {"position_abs_tilt_off"}
+    assert {one.name for one in fields(Profile)} - set(paper.switches(meeting.found)) <= allowed
+
+
+def test_speeds_are_those_of_the_motors(profile: str, meeting: Meeting) -> None:
+    true = PROFILES[profile]
+    for one in meeting.found.speeds:
+        rate = true.pan_speeds[one.level - 1] * (1.0 if one.axis == "pan" else true.tilt_share)
+        assert one.per_s == pytest.approx(rate, rel=0.12, abs=0.3), one
+    assert len(meeting.found.speeds) == 6
+
+
+def test_it_leaves_the_camera_as_it_was(meeting: Meeting) -> None:
+    pose = meeting.state["pose"]
+    assert not meeting.state["moving"]
+    assert abs((pose["pan"] + 180.0) % 360.0 - 180.0) <= 0.7
+    assert abs(pose["tilt"] - 20.0) <= 0.7
+    assert pose["zoom"] == 0.0
+    assert meeting.changes == 0
+    assert [
+        target for target in meeting.asked if "setConfig" in target or "Preset&" in target.replace("GotoPreset", "")
+    ] == []
+    assert meeting.state["door"]["wrong"] == 0
+
+
+def test_what_it_writes_down_tells_nothing_of_whose_camera_it_is(meeting: Meeting) -> None:
+    assert len(meeting.files) >= 25
+    whole = "\n".join(meeting.files.values())
+    for secret in (PASSWORD, '"ros"', "Kitchen", "127.0.0.1"):
+        assert secret not in whole
+
+
+def test_without_leave_it_only_reads() -> None:
+    meeting = meet("ip4m-1041b", may_move=False)
+    actions = {
+        part for target in meeting.asked for part in target.partition("?")[2].split("&") if part.startswith("action=")
+    }
+    assert {action for action in actions if not action.startswith(("action=get", "action=attach"))} == set()
+    assert not meeting.found.moved
+    assert meeting.found.unknown["position_abs"] == "only a moving camera shows it"
+
+
+def test_a_wrong_password_is_tried_once() -> None:
+    with simulator(latency_s=0) as camera:
+        wire = wire_to(camera, "wrong-horse")
+        with pytest.raises(BadLogin, match="no more will be"):
+            contact(wire, Quiet(camera), lambda found: True)
+        wire.close()
+        assert httpx.get(f"{camera.side_door_url}/state").json()["door"]["wrong"] == 1
+
+
+def test_nobody_there_is_told_at_once() -> None:
+    wire = Wire(f"http://127.0.0.1:{free_port()}", "ros", SecretStr(PASSWORD))
+    with pytest.raises(Away, match="nobody answers"):
+        contact(wire, Quiet.__new__(Quiet), lambda found: True)
+    wire.close()
+
+
+class Interrupted(BaseException):
+    """Ctrl-C, as far as the probe can tell."""
+
+
+def test_ctrl_c_in_the_middle_of_a_motion_stops_the_camera() -> None:
+    with simulator(latency_s=LATENCY_S) as camera:
+        wire = wire_to(camera)
+
+        def pause(seconds: float) -> None:
+            if camera.server.device.motion(camera.server.clock())[1].pan:
+                raise Interrupted
+            threading.Event().wait(seconds)
+
+        wire.pause = pause
+        with pytest.raises(Interrupted):
+            contact(wire, Quiet(camera), lambda found: True)
+        wire.close()
+        wait_until(lambda: not any(camera.server.device.motion(camera.server.clock())[1]), "the stop", 2.0)
+
+
+def test_its_section_is_one_that_the_configuration_takes(tmp_path: Path, meetings: dict[str, Future[Meeting]]) -> None:
+    for name, met in meetings.items():
+        found = met.result().found
+        file = tmp_path / f"{name}.yaml"
+        home = f"home: {SHIPPED / 'home.yaml'}\n"
+        file.write_text(home + paper.section(found, "ip9", "ros"))
+        apartment = load(file, environment={"CAMERA_IP9_PASSWORD": PASSWORD}, deep=True)
+        settings: Any = apartment.instances["camera-ip9"].config
+        assert settings.url == found.url
+        assert settings.channel in PROFILES[name].ptz_channels
+        assert settings.picture.flip
+
+
+def test_its_profile_makes_a_simulated_camera_of_the_same_ways(meetings: dict[str, Future[Meeting]]) -> None:
+    for name, met in meetings.items():
+        found = met.result().found
+        section = yaml.safe_load(paper.profile(found))["simulators"]["camera"]
+        again = simulated.Config.model_validate({"folder": SHIPPED, **section}).switches
+        same = {one.name for one in fields(Profile)} - UNSEEN - set(MEASURED) - set(found.unknown) - NO_DIGEST
+        true = PROFILES[name]
+        if true.position_abs != "full":
+            same.discard("position_abs_tilt_off")
+        if true.preset_max <= 9:
+            same.discard("unset_preset")
+        assert {key: getattr(again, key) for key in same} == {key: getattr(true, key) for key in same}
+
+
+def test_names_and_addresses_are_taken_out() -> None:
+    clean = anonymous.cleaner("AMC018NP69LM4VM2VY", "Bedroom", "grandma")
+    text = (
+        'realm="Login to AMC018NP69LM4VM2VY" grandma 192.168.1.20 version=2.420.0.1.R "9C:8E:CD:01:02:03"\r\n'
+        "name=Bedroom\r\npresets[0].Index=4\r\npresets[0].Name=Under the bed\r\n"
+    )
+    left = clean(text)
+    for secret in ("018NP69", "grandma", "192.168", "9C:8E", "Bedroom", "Under"):
+        assert secret not in left
+    assert "presets[0].Index=4" in left
+
+
+@pytest.mark.parametrize(
+    ("body", "form"),
+    [
+        (b"--b\r\nContent-Length:37\r\n\r\nCode=VideoMotion;action=Start;index=0\r\n\r\n", "B"),
+        (b"--b\r\nContent-Length: 78\r\n\r\nCode=VideoMotion;action=Start;index=0;data={\n}\n", "A"),
+    ],
+)
+def test_the_form_of_an_event_is_read_from_the_stream(body: bytes, form: str) -> None:
+    assert read_events(body)["event_form"] == form
+    assert read_events(b"HTTP/1.1 200 OK\r\n\r\n" + body)["event_header_twice"]
+
+
+def command(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "services", "probe", *words], cwd=folder, capture_output=True, text=True, timeout=120,
+        stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(SHIPPED.parent), **environment},
+    )  # fmt: skip
+
+
+def test_the_command_tells_each_step_and_leaves_its_papers(tmp_path: Path) -> None:
+    with simulator(latency_s=0.01) as camera:
+        done = command(tmp_path, "ip9", "--url", camera.url, "--user", "ros", CAMERA_IP9_PASSWORD=PASSWORD)
+    assert done.returncode == 0, done.stderr
+    steps = [line for line in done.stdout.splitlines() if f"/{len(READS) + 1}]" in line]
+    assert [line[1:3].strip() for line in steps] == [str(number) for number in range(1, len(READS) + 1)]
+    assert "may be used again" in done.stdout
+    files = [file for file in (tmp_path / "probe-ip9").rglob("*") if file.is_file()]
+    assert {"ip9.yaml", "profile.yaml", "report.json"} <= {file.name for file in files}
+    assert [file for file in files if PASSWORD in file.read_text()] == []
+    assert PASSWORD not in done.stdout + done.stderr
+
+
+def test_the_command_gives_data_and_takes_a_configured_camera(tmp_path: Path) -> None:
+    with simulator(latency_s=0.01) as camera:
+        config = tmp_path / "apartment.yaml"
+        section = f"  ip1: {{url: '{camera.url}', user: ros, password: '${{CAMERA_IP1_PASSWORD}}'}}\n"
+        config.write_text(f"home: {SHIPPED / 'home.yaml'}\ncameras:\n{section}")
+        done = command(tmp_path, "ip1", "--json", "--config", str(config), CAMERA_IP1_PASSWORD=PASSWORD)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["model"] == "IP3M-941W"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("ip9", "--url", "http://ros:secret@192.0.2.9"), "without a password"),
+        (("Bad Name", "--url", "http://192.0.2.9"), "expected a name like ip1"),
+        (("ip9", "--url", "http://192.0.2.9"), "expected the camera's password in the environment"),
+    ],
+)
+def test_wrong_usage_is_told(tmp_path: Path, words: tuple[str, ...], told: str) -> None:
+    done = command(tmp_path, *words)
+    assert done.returncode == 2
+    assert told in done.stderr
