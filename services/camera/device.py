@@ -33,7 +33,7 @@ from services.errors import DeviceError
 from services.runner import Post
 
 REPLY = "/camera/reply"
-STILL_DEG = 0.15  # two readings nearer than this are the same: the resolution is 0.1 degree
+STILL_DEG = 0.25  # two readings nearer than this are the same: the resolution is 0.1 degree, and some dither by that
 END_S = 3.5  # the end of the service waits so long for a camera to stand still; then its watchdog goes on
 
 Turning = Callable[[Direction | None], None]

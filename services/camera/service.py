@@ -25,8 +25,8 @@ from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
 from services.camera.ptz.goal import Goal
 from services.camera.ptz.motors import Motors
-from services.camera.ptz.move import goto
-from services.camera.ptz.pace import Skill
+from services.camera.ptz.move import Arrival, goto
+from services.camera.ptz.skill import Skill
 from services.camera.requests import GetPicture, Identify, Identity, Picture, Rank, Reading, Refused, Reply, Status
 from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
@@ -281,7 +281,13 @@ class CameraService:
         assert isinstance(command, GotoPlace | LookAt)
         near = self.bulletin.at_rest(now, FRESH_S)
         until = now + self.config.move_timeout_s
-        return goto(self._goal(command), self.config.limits, self.skill, until, near=near)
+        return self._moved(goto(self._goal(command), self.config.limits, self.skill, until, near=near))
+
+    def _moved(self, plan: Plan[Arrival]) -> Plan[Arrival]:
+        """A move, after which it is known that the camera rests."""
+        arrival = yield from plan
+        self.bulletin.rests(arrival.reading, arrival.at)
+        return arrival
 
     def _motor_ended(self, job: Job, state: OrderState, error: str | None, now: float) -> None:
         if isinstance(job.command, ScanFor):

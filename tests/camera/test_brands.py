@@ -286,7 +286,8 @@ def test_it_closes_its_connections(brand: str) -> None:
 def test_the_whole_service_goes_to_a_place(brand: str, tmp_path: Path) -> None:
     with simulator(latency_s=0.05) as camera, bench(tmp_path, camera, brand=brand) as here:
         here.order("Goto", "Kitchen", "1")
-        assert here.end_of("1", 60)["state"] == "done"
+        end = here.end_of("1", 60)
+        assert end["state"] == "done", end["error"]
         place = replace(reading_of(here.service.places.get("Kitchen")), moving=None)
         now = reading_of(here.truth()["pose"])
         assert abs((now.pan - place.pan + 180) % 360 - 180) <= 0.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from random import Random
 from threading import RLock
-from typing import Literal, TypeVar
+from typing import Literal
 
 from services.simulators.camera.clock import Clock
 from services.simulators.camera.config_tables import Tables
@@ -17,9 +17,9 @@ from services.simulators.camera.motion import MotionDetector
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.profiles import Profile
 from services.simulators.camera.ptz import Ptz
+from services.simulators.camera.sound import Microphone, Speaker
 from services.simulators.true_camera import WorldCamera
 
-T = TypeVar("T")
 Program = Callable[[Request, float], Answer]
 
 
@@ -33,6 +33,7 @@ class Device:
         self.ptz = Ptz(camera, profile, self.tables, self.latency, now)
         self.events, self.detector = Events(profile), MotionDetector(self.tables)
         self.identity, self.clock = Identity(profile, camera.serial, self.tables), Clock(now)
+        self.microphone, self.speaker = Microphone(seed=1), Speaker()
         self.boots_until = float("-inf")
         self.rights = True  # whether the account may do more than look
         self._dice = Random(camera.serial)
@@ -71,7 +72,7 @@ class Device:
         with self._lock:
             self.ptz.motors.place(pose, now)
 
-    def step(self, act: Callable[[], T]) -> T:
+    def step(self, act: Callable[[], Answer]) -> Answer:
         """Something that another program of the camera does, undisturbed by the others."""
         with self._lock:
             return act()

@@ -178,8 +178,6 @@ class Door:
         parts = [f'realm="{self.realm}"', f'qop="{self.profile.qop}"', f'nonce="{nonce}"', f'opaque="{self.opaque}"']
         parts += [f"algorithm={algorithm}"] if algorithm != "MD5" else []
         parts += ['stale="true"'] if stale else []
-        if self.profile.realm == "mac":  # the form that the first document of the API prints
-            parts = [parts[0], parts[2], f"stale={str(stale).upper()}", parts[1]]
         return "Digest " + (", " if self.profile.challenge_spacing == "spaced" else ",").join(parts)
 
 

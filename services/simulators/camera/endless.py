@@ -1,11 +1,11 @@
-"""The answers that do not end: the MJPEG stream and the events. Bytes as they go out; `http` writes them."""
+"""The answers that do not end: MJPEG, events and, in `audio`, the microphone. Bytes as they go out; `http` writes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING
 
-from services.simulators.camera import events
+from services.simulators.camera import audio, events
 from services.simulators.camera.messages import Request
 from services.simulators.camera.view.picture import Stream
 
@@ -54,3 +54,4 @@ def attach(camera: CameraServer, request: Request) -> Generator[bytes]:
 
 
 ENDLESS: dict[tuple[str, str], Endless] = {("mjpg/video", ""): video, ("eventManager", "attach"): attach}
+ENDLESS["audio", "getAudio"] = audio.microphone
