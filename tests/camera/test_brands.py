@@ -17,6 +17,7 @@ from pydantic import SecretStr
 
 from services.camera import brands
 from services.camera.address import Address
+from services.camera.capabilities import Capabilities, GetCapabilities
 from services.camera.device import same
 from services.camera.requests import (
     Away,
@@ -219,6 +220,13 @@ def test_it_says_who_it_is(driver: Camera) -> None:
     assert isinstance(identity, Identity)
     assert (identity.model, identity.serial) == ("IP3M-941W", "AMC0000000000001")
     assert identity.version.startswith("2.420.AC00.15.R")
+
+
+def test_it_says_what_its_motors_can_without_moving(driver: Camera, camera: simulated.Simulated) -> None:
+    told = driver.send(GetCapabilities("motors"))
+    assert isinstance(told, Capabilities)
+    assert (told.presets, told.zoom) == (25, True)
+    assert not state(camera)["moving"]
 
 
 def test_a_wrong_password_is_a_bad_login_and_not_tried_on(brand: str, camera: simulated.Simulated) -> None:

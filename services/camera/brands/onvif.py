@@ -19,7 +19,8 @@ import httpx
 
 from services.camera import requests
 from services.camera.address import Address
-from services.camera.requests import Away, Camera, Identity, Reading, Refused, Start
+from services.camera.capabilities import Capabilities, GetCapabilities
+from services.camera.requests import Away, Camera, Identity, Reading, Refused, Start, StreamAddress
 from services.camera.web.connection import SNAPSHOT, connection, fetch
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
@@ -58,6 +59,7 @@ class Onvif:
         self.soap = Soap(self.http, address, gate, urgent=urgent)
         self._paths: dict[str, str] = {DEVICE: FIRST}
         self._profile: Profile | None = None
+        self._node_token = ""
 
     def close(self) -> None:
         """Ends the connection."""
@@ -80,8 +82,12 @@ class Onvif:
                 return self._clear(number)
             case requests.Snapshot():
                 return self._snapshot()
+            case requests.FindStream():
+                return self._stream()
             case requests.Identify():
                 return self._identify()
+            case GetCapabilities("motors"):
+                return read_capabilities(self._node())
             case requests.Reboot():
                 self._ask(DEVICE, "SystemReboot")
                 return None
@@ -109,9 +115,14 @@ class Onvif:
             mine = next((one for one in told if one.find(f"{SCHEMA}PTZConfiguration") is not None), None)
             if mine is None:
                 raise Refused("the camera has no ONVIF profile with motors")
-            node = mine.findtext(f"{SCHEMA}PTZConfiguration/{SCHEMA}NodeToken") or ""
-            self._profile = read_profile(mine.get("token", ""), self._ask(PTZ, "GetNode", _token("NodeToken", node)))
+            self._node_token = mine.findtext(f"{SCHEMA}PTZConfiguration/{SCHEMA}NodeToken") or ""
+            self._profile = read_profile(mine.get("token", ""), self._node())
         return self._profile
+
+    def _node(self) -> Element:
+        if not self._node_token:
+            self._known_profile()
+        return self._ask(PTZ, "GetNode", _token("NodeToken", self._node_token))
 
     def _ptz(self, action: str, inner: str = "") -> Element:
         return self._ask(PTZ, action, _token("ProfileToken", self._known_profile().token) + inner)
@@ -152,6 +163,16 @@ class Onvif:
             raise Away(f"expected a JPEG, got {answer.status_code} {answer.content[:40]!r}")
         return answer.content
 
+    def _stream(self) -> StreamAddress:
+        """On the host that the configuration names and its port; only the path is the camera's word."""
+        setup = f'<Stream xmlns="{SCHEMA[1:-1]}">RTP-Unicast</Stream>'
+        setup += f'<Transport xmlns="{SCHEMA[1:-1]}"><Protocol>RTSP</Protocol></Transport>'
+        mine = _token("ProfileToken", self._known_profile().token)
+        told = self._ask(MEDIA, "GetStreamUri", f"<StreamSetup>{setup}</StreamSetup>{mine}")
+        host = httpx.URL(self.address.url).host
+        where = f"[{host}]" if ":" in host else host
+        return StreamAddress(f"rtsp://{where}:{self.address.rtsp_port}{_local(told.findtext(f'.//{SCHEMA}Uri') or '')}")
+
     def _identify(self) -> Identity:
         told = self._ask(DEVICE, "GetDeviceInformation")
         keys = ("Model", "SerialNumber", "FirmwareVersion")
@@ -178,6 +199,19 @@ def read_profile(token: str, node: Element) -> Profile:
     pan = _bounds(node, "AbsolutePanTiltPositionSpace", "XRange", GENERIC)
     tilt = _bounds(node, "AbsolutePanTiltPositionSpace", "YRange", GENERIC)
     return Profile(token, pan, tilt, _bounds(node, "AbsoluteZoomPositionSpace", "XRange", (0.0, 1.0)))
+
+
+def read_capabilities(node: Element) -> Capabilities:
+    """What the motors' node tells; every ContinuousMove can be told when to end."""
+    kinds = {one.tag.removeprefix(SCHEMA) for one in node.iterfind(f".//{SCHEMA}SupportedPTZSpaces/*")}
+    most = node.findtext(f".//{SCHEMA}MaximumNumberOfPresets") or ""
+    return Capabilities(
+        presets=int(most) if most.isdigit() else 0,
+        absolute="AbsolutePanTiltPositionSpace" in kinds,
+        relative="RelativePanTiltTranslationSpace" in kinds,
+        timed="ContinuousPanTiltVelocitySpace" in kinds,
+        zoom="ContinuousZoomVelocitySpace" in kinds,
+    )
 
 
 def read_reading(told: Element, profile: Profile, address: Address) -> Reading:
