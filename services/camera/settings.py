@@ -81,7 +81,7 @@ class Config(Section):
 
     name: str = "ip1"
     folder: Path = Path()
-    state: Path | None = None  # the apartment's folder for what is to be remembered; given too
+    state: Path | None = None  # where what is learnt of the camera is kept; None: nowhere
     profile: Literal["full", "low"] = "full"  # "low": what is not given is as in LOW
     brand: str = "amcrest"  # a module of `camera/brands/`
     url: str

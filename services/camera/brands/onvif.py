@@ -69,7 +69,13 @@ class Onvif:
         """One request of ours, mostly one of the camera's; DeviceError as in `requests.py`."""
         match request:
             case Start():
-                return self._command("ContinuousMove", f"{velocity(request)}<Timeout>PT{ITSELF_S}S</Timeout>")
+                return self._command("ContinuousMove", f"{velocity(request)}{_token('Timeout', f'PT{ITSELF_S}S')}")
+            case requests.TurnFor(right, down, zoom, seconds):
+                speeds = vector("Velocity", right / 100, -down / 100, zoom / 100)
+                return self._command("ContinuousMove", speeds + _token("Timeout", f"PT{seconds:.2f}S"))
+            case requests.MoveTo(pan, tilt, zoom, form="PositionABS"):
+                where = position(Reading(pan, tilt, zoom), self._known_profile(), self.address)
+                return self._command("AbsoluteMove", vector("Position", *where))
             case requests.Stop():
                 return self._command("Stop", "<PanTilt>true</PanTilt><Zoom>true</Zoom>")
             case requests.Status():
@@ -187,11 +193,16 @@ def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:
 def velocity(request: Start) -> str:
     """The speeds of a motion, 1 to 8, as eighths of the top speed."""
     right, down, zoom = request.direction.value
-    if zoom:
-        return f'<Velocity><Zoom xmlns="{SCHEMA[1:-1]}" x="{zoom}"/></Velocity>'
     pan_speed = min(8, max(1, request.speed)) / 8
     tilt_speed = min(8, max(1, request.tilt_speed or request.speed)) / 8 if right else pan_speed
-    return f'<Velocity><PanTilt xmlns="{SCHEMA[1:-1]}" x="{right * pan_speed}" y="{-down * tilt_speed}"/></Velocity>'
+    return vector("Velocity", right * pan_speed, -down * tilt_speed, zoom)
+
+
+def vector(kind: str, x: float, y: float, z: float) -> str:
+    """Numbers for each motor; speeds of zero are left out, for a camera may stop that motor for them."""
+    turn = f'<PanTilt xmlns="{SCHEMA[1:-1]}" x="{x:.5f}" y="{y:.5f}"/>' if kind == "Position" or x or y else ""
+    zoom = f'<Zoom xmlns="{SCHEMA[1:-1]}" x="{z:.5f}"/>' if kind == "Position" or z else ""
+    return f"<{kind}>{turn}{zoom}</{kind}>"
 
 
 def read_profile(token: str, node: Element) -> Profile:
@@ -232,6 +243,21 @@ def read_reading(told: Element, profile: Profile, address: Address) -> Reading:
     return Reading(
         round(pan, 2) % 360.0, round(tilt, 2), round(wide + _share(z, profile.zoom) * (close - wide), 2), moving
     )
+
+
+def position(goal: Reading, profile: Profile, address: Address) -> tuple[float, float, float]:
+    """The other way: readings in the camera's spaces, never beyond their bounds."""
+    (low, high), (dead, after), (wide, close) = address.tilt_range, address.pan_dead_arc, address.zoom_range
+    if profile.in_degrees:
+        x, y = (goal.pan + 180.0) % 360.0 - 180.0, -goal.tilt
+    else:
+        x = _within(((goal.pan - after) % 360.0) / (360.0 - (after - dead)), profile.pan)
+        y = _within((high - goal.tilt) / (high - low), profile.tilt)
+    return x, y, _within((goal.zoom - wide) / (close - wide), profile.zoom)
+
+
+def _within(share: float, bounds: Bounds) -> float:
+    return bounds[0] + min(max(share, 0.0), 1.0) * (bounds[1] - bounds[0])
 
 
 def _share(value: float, bounds: Bounds) -> float:

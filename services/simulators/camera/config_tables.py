@@ -9,6 +9,7 @@ from services.simulators.camera.profiles import Profile
 from services.simulators.true_camera import Lens
 
 Colour = Literal["colour", "auto", "bw"]
+LEAST_SIDE, MOST_SIDE = 64, 4096  # of a picture, pixels
 SUB_WIDTH = 704  # the substream's; its height follows the main stream's shape
 MODES: dict[str, Colour] = {"0": "colour", "1": "auto", "2": "bw"}
 DAY_NIGHT: dict[str, Colour] = {"Color": "colour", "Brightness": "auto", "BlackWhite": "bw"}
@@ -73,10 +74,11 @@ def defaults(profile: Profile, lens: Lens) -> dict[str, str]:
 
 
 class Tables:
-    """The tables of one camera; `changes` grows with every write."""
+    """The tables of one camera; `changes` grows with every write, `encoders` with those to the Encode table."""
 
     def __init__(self, profile: Profile, lens: Lens) -> None:
         self._profile, self._values, self.changes = profile, defaults(profile, lens), 0
+        self.encoders = 0
 
     def read(self, name: str) -> list[str] | None:
         """The lines of a table or a part of it; None when there is no such table."""
@@ -95,7 +97,12 @@ class Tables:
         known = {key: _like(self._values[key], value, key) for key, value in pairs if key in self._values}
         self._values |= known
         self.changes += bool(known)
+        self.encoders += any(key.startswith("Encode[") for key in known)
         return True
+
+    def fix(self, key: str, value: str) -> None:
+        """What the camera knows of itself."""
+        self._values[key] = value
 
     def text(self, key: str) -> str:
         """One value; KeyError when the camera has none."""
@@ -124,8 +131,13 @@ def _like(old: str, new: str, key: str) -> str:
     """A written value in the form of the old one; nonsense leaves the old, numbers out of range are clamped."""
     if old in ("true", "false"):
         return new.lower() if new.lower() in ("true", "false") else old
-    if old.isdigit():
-        if not new.lstrip("-").isdigit():
-            return old
-        return str(min(max(int(new), 0), 100)) if key.startswith("VideoColor") else str(max(int(new), 0))
-    return new
+    return _whole(old, new, key) if old.isdigit() else new
+
+
+def _whole(old: str, new: str, key: str) -> str:
+    """A number within what the camera can do; a picture's sides are even and not too small."""
+    if not new.lstrip("-").isdigit():
+        return old
+    if key.endswith(("Video.Width", "Video.Height")):
+        return str(int(new) // 2 * 2) if LEAST_SIDE <= int(new) <= MOST_SIDE else old
+    return str(min(max(int(new), 0), 100)) if key.startswith("VideoColor") else str(max(int(new), 0))

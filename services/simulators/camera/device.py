@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from random import Random
 from threading import RLock
-from typing import Literal, TypeVar
+from typing import Literal
 
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.events import Events
@@ -17,7 +17,6 @@ from services.simulators.camera.profiles import Profile
 from services.simulators.camera.ptz import Ptz
 from services.simulators.true_camera import WorldCamera
 
-T = TypeVar("T")
 Program = Callable[[Request, float], Answer]
 
 
@@ -65,7 +64,7 @@ class Device:
         with self._lock:
             self.ptz.motors.place(pose, now)
 
-    def step(self, act: Callable[[], T]) -> T:
+    def step(self, act: Callable[[], Answer]) -> Answer:
         """Something that another program of the camera does, undisturbed by the others."""
         with self._lock:
             return act()
@@ -92,7 +91,7 @@ class Device:
             "getMachineName": [f"name={self.tables.text('General.MachineName')}"],
             "getVendor": ["vendor=Amcrest"],
         }
-        if request.action in ("reboot", "shutdown"):  # some models come up again after a shutdown too
+        if request.action == "reboot":
             return self.reboot(now)
         return lines(facts[request.action]) if request.action in facts else refusal(profile)
 

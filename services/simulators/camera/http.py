@@ -6,26 +6,25 @@ import socket
 import struct
 import sys
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Generator
+from contextlib import closing, suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
 from threading import Event, Lock
 from typing import Any
 
-from services.simulators.camera import events
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, Verdict
+from services.simulators.camera.endless import ENDLESS
 from services.simulators.camera.faults import Faults, Network
 from services.simulators.camera.messages import Answer, Request, read, refusal, spelt
 from services.simulators.camera.onvif.service import Onvif
-from services.simulators.camera.view.picture import Pictures, Stream
+from services.simulators.camera.view.picture import Pictures
 
 IMAGE = "image/jpeg"
 LOG_LENGTH = 2000
 SOAP_BYTES = 1 << 20
-HEARTBEATS_S = (1.0, 60.0)
 ROOT = b"<html><head><title>WEB</title></head><body></body></html>"
 
 
@@ -51,6 +50,7 @@ class CameraServer(Port):
         self.device, self.door, self.pictures, self.clock = device, door, pictures, clock
         self.closing, self.log = Event(), deque[dict[str, Any]](maxlen=LOG_LENGTH)
         self.faults, self.network = Faults(), Network()
+        self.cuts: list[Callable[[], None]] = []  # how the connections of other ports are cut
         self.running = Event()  # cleared while frozen
         self.running.set()
         self.control, self.snapshot, self._lock = Lock(), Lock(), Lock()
@@ -76,6 +76,17 @@ class CameraServer(Port):
     def connected(self) -> int:
         """How many connections there are."""
         return len(self._open)
+
+    def judge_viewer(self, method: str, header: str | None) -> bool:
+        """The same for RTSP, where the challenge is another's."""
+        with self._lock:
+            return self.door.judge_viewer(method, header, self.clock())
+
+    @property
+    def shows_pictures(self) -> bool:
+        """Whether new pictures go out."""
+        on = self.running.is_set() and self.network.up.is_set() and not self.is_off
+        return on and not self.faults.frozen_stream
 
     def enter(self, connection: socket.socket) -> None:
         """A connection was opened."""
@@ -117,6 +128,12 @@ class CameraServer(Port):
                 with suppress(OSError):
                     connection.shutdown(socket.SHUT_RDWR)
         self.device.events.wake_all()
+        self.cut_streams()
+
+    def cut_streams(self) -> None:
+        """Ends the RTSP connections."""
+        for cut in self.cuts:
+            cut()
 
     def switch_off(self) -> None:
         """Ends every wait and connection, so that `server_close` finds no thread left."""
@@ -181,19 +198,25 @@ class Connection(BaseHTTPRequestHandler):
     do_POST = do_GET  # noqa: N815 (the base class looks for these names)
 
     def _serve(self, request: Request, entry: dict[str, Any]) -> None:
-        special = {("snapshot", ""): self._snapshot, ("mjpg/video", ""): self._video}
-        special[("eventManager", "attach")] = self._events
-        how = special.get((request.cgi, request.action), self._control)
-        how(request, entry)
+        endless = ENDLESS.get((request.cgi, request.action))
+        if endless is not None:
+            self._endless(endless(self.server, request), entry)
+        elif request.cgi == "snapshot":
+            self._snapshot(request, entry)
+        else:
+            self._control(request, entry)
 
     def _control(self, request: Request, entry: dict[str, Any]) -> None:
         """One at a time, and it acts when it has been processed."""
+        encoders = self.server.device.tables.encoders
         with self.server.control:
             self.server.delay(self.server.device.latency.control(self.server.clock()))
             answer = self.server.device.answer(request, self.server.clock())
         self._send(answer, entry)
         if self.server.device.booting(self.server.clock()):
             self.server.went_down()
+        elif self.server.device.tables.encoders != encoders:
+            self.server.cut_streams()
 
     def _soap(self, entry: dict[str, Any]) -> None:
         """ONVIF checks logins itself, message by message."""
@@ -222,35 +245,11 @@ class Connection(BaseHTTPRequestHandler):
             return self._fail(how, entry)
         return self._send(Answer(self.server.faults.picture(data), content_type=IMAGE), entry)
 
-    def _video(self, request: Request, entry: dict[str, Any]) -> None:
-        stream: Stream = "ExtraFormat" if request.text("subtype", "0") != "0" else "MainFormat"
-        kind = f"multipart/x-mixed-replace; boundary={events.BOUNDARY}"
+    def _endless(self, chunks: Generator[bytes], entry: dict[str, Any]) -> None:
         entry["status"] = 200
-        self._write(f"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Type: {kind}\r\n\r\n".encode())
-        while not self.server.closing.is_set():
-            self.server.running.wait()
-            data = self.server.pictures.jpeg(stream, self.server.clock())
-            head = f"--{events.BOUNDARY}\r\nContent-Type: {IMAGE}\r\nContent-Length: {len(data)}\r\n\r\n"
-            self._write(head.encode() + data + b"\r\n")
-            self.server.closing.wait(1 / self.server.pictures.fps(stream))
-
-    def _events(self, request: Request, entry: dict[str, Any]) -> None:
-        least, most = HEARTBEATS_S
-        beat = request.text("heartbeat")
-        every = min(max(float(beat), least), most) if beat.isdigit() else most
-        subscription = self.server.device.events.subscribe(events.wanted(request.text("codes")))
-        entry["status"] = 200
-        try:
-            self._write(events.START)
-            while not self.server.closing.is_set():
-                text = subscription.next(every)
-                self.server.running.wait()
-                if text == "":
-                    return
-                if text or (beat and self.server.device.profile.heartbeat):
-                    self._write(events.part(text or "Heartbeat"))
-        finally:
-            self.server.device.events.leave(subscription)
+        with closing(chunks):
+            for chunk in chunks:
+                self._write(chunk)
 
     def _challenge(self, verdict: Verdict, entry: dict[str, Any]) -> None:
         entry["status"] = 401

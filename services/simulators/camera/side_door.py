@@ -1,6 +1,6 @@
 """The tests' way in, on a port of its own: JSON to see and to change what no real camera would tell.
 
-GET  /state                              true pose, reading, motion, counters of the door
+GET  /state                              true pose, reading, motion, the door's counters, frames rendered and their rate
 GET  /motors                             what they can (position, speeds, accelerations) and what they did (counters)
 GET  /log                                requests: time, method, target, status, authorized
 POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand there at once
@@ -39,13 +39,14 @@ def state(camera: CameraServer) -> dict[str, Any]:
         "booting": camera.device.booting(now),
         "presets": {number: name for number, (name, _) in camera.device.ptz.presets.items()},
         "door": camera.door.counters,
+        **camera.pictures.rates(),
     }
 
 
 def motors(camera: CameraServer) -> dict[str, Any]:
     """The constants of each axis (pan as travel: reading = (180 - travel) mod 360), and what has been done so far."""
     ptz = camera.device.ptz
-    worked = camera.device.step(lambda: ptz.motors.worked(camera.clock()))
+    worked = ptz.motors.worked(camera.clock())
     axes = {name: asdict(rail) for name, rail in zip(Axes._fields, ptz.motors.rails, strict=True)}
     done = {"travelled": worked.travelled._asdict(), "pushed_s": worked.pushed_s._asdict()}
     return {"axes": axes, **done, "motions": worked.motions, "commands": ptz.commands}

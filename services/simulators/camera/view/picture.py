@@ -17,10 +17,12 @@ from services.simulators.camera.motors import Pose, magnification
 from services.simulators.camera.view.optics import Window, project, window
 from services.simulators.camera.view.prints import Image
 from services.simulators.camera.view.scene import Scene
+from services.simulators.camera.view.tally import Tally
 from services.simulators.true_camera import WorldCamera
 from services.vision.frames import Array
 
 Stream = Literal["MainFormat", "ExtraFormat"]
+STREAMS: tuple[Stream, ...] = ("MainFormat", "ExtraFormat")
 EXPOSURE_S = 1 / 30  # indoors, by lamp light
 NOISE = 2.2  # grey levels, one sigma
 NOISE_PLAY = 64  # pixels by which the noise pattern is shifted from frame to frame
@@ -48,6 +50,7 @@ class Pictures:
         self._stills: dict[Stream, Still] = {}
         self._newest: dict[Stream, tuple[object, bytes]] = {}
         self._rng = np.random.default_rng(seed)
+        self._tallies: dict[Stream, Tally] = {stream: Tally() for stream in STREAMS}
 
     @cached_property
     def _noise(self) -> NDArray[np.int8]:
@@ -57,6 +60,23 @@ class Pictures:
     def fps(self, stream: Stream) -> int:
         """Frames per second of a stream."""
         return min(max(self._tables.number(f"Encode[0].{stream}[0].Video.FPS"), 1), 30)
+
+    def size(self, stream: Stream) -> tuple[int, int]:
+        """Width and height of a stream's pictures."""
+        video = f"Encode[0].{stream}[0].Video."
+        return self._tables.number(video + "Width"), self._tables.number(video + "Height")
+
+    def rates(self) -> dict[str, dict[str, float]]:
+        """How many pictures of each stream were made, and how many a second lately."""
+        return {
+            "frames_rendered": {stream: tally.frames for stream, tally in self._tallies.items()},
+            "fps": {stream: tally.fps() for stream, tally in self._tallies.items()},
+        }
+
+    def frame(self, stream: Stream, now: float) -> Image:
+        """The picture of this moment (BGR), made anew."""
+        with self._lock:
+            return self._developed(stream, *self._motors(now))
 
     def jpeg(self, stream: Stream, now: float) -> bytes:
         """The picture of this moment, encoded."""
@@ -68,8 +88,8 @@ class Pictures:
             return self._newest[stream][1]
 
     def _developed(self, stream: Stream, pose: Pose, rates: Pose) -> Image:
-        video = f"Encode[0].{stream}[0].Video."
-        size = (self._tables.number(video + "Width"), self._tables.number(video + "Height"))
+        self._tallies[stream].note()
+        size = self.size(stream)
         still = self._still(stream, pose, size)
         image = blurred(still.image, self._sweep(pose, rates, still.window))
         image = _resized(self._noisy(image), size)
