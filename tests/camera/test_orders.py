@@ -5,23 +5,26 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import wave
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 import yaml
 
 from services import peers
+from services.camera import orders
 from services.client import FINAL, Client
 from services.payloads import OrderResult
 from tests.camera.trials import apart
 from tests.small_flat import Door, SmallFlat, small_flat
 
 pytestmark = [pytest.mark.mosquitto, pytest.mark.ros]
-SIMULATOR = {"latency_s": 0.05, "switches": {"boot_s": 3.0}}
+SIMULATOR = {"latency_s": 0.05, "switches": {"boot_s": 3.0, "lens_mask": True}}
 CAMERA = {"frames": 1, "discovery": True}
 HOWS = ("mosquitto_pub", "rostopic pub")
 
@@ -70,11 +73,11 @@ class Here:
     def at(self, **axes: float) -> None:
         """Puts the camera there, and waits until the service has seen it."""
         self.door.tell("pose", **axes)
-        wanted = axes.get("pan", self.door.state()["reading"]["pan"])
 
         def seen() -> bool:
-            position = self.said("position")
-            return apart(position["pan"], wanted) < 0.5 and not position["moving"]
+            told, true = self.said("position"), self.door.state()["reading"]
+            near = all(apart(told[axis], true[axis]) < 0.5 for axis in true)
+            return near and not told["moving"]
 
         self.until(seen, "the position")
 
@@ -306,6 +309,37 @@ def usual_contrast(here: Here) -> None:
     option("VideoColor[0][0].Contrast", "50", "VideoColor")(here)
 
 
+def hears_the_tone(here: Here) -> None:
+    told = here.said("audio")
+    with wave.open(str(sounds(here) / told["file"])) as file:
+        seconds, samples = file.getnframes() / file.getframerate(), file.readframes(file.getnframes())
+    assert seconds == pytest.approx(1.0, abs=0.1)
+    heard = np.abs(np.fft.rfft(np.frombuffer(samples, np.int16)))
+    assert float(np.argmax(heard)) / seconds == pytest.approx(700.0, abs=5.0)
+
+
+def a_tone(here: Here) -> None:
+    here.door.tell("tone", hertz=700.0)
+
+
+def a_file(here: Here) -> None:
+    """Half a second of sound in the folder of sounds."""
+    sounds(here).mkdir(exist_ok=True)
+    with wave.open(str(sounds(here) / "ding.wav"), "wb") as file:
+        file.setparams((1, 2, 8000, 0, "NONE", ""))
+        file.writeframes((8000 * np.sin(np.arange(4000) * 0.5)).astype("<i2").tobytes())
+
+
+def is_played(here: Here) -> None:
+    played = httpx.get(f"{here.door.url}/played").json()
+    assert played[-1]["seconds"] == pytest.approx(0.5, abs=0.05)
+
+
+def sounds(here: Here) -> Path:
+    """The audio folder."""
+    return here.flat.folder / "config" / "audio"
+
+
 def rebooted(here: Here) -> None:
     assert any("action=reboot" in entry["target"] for entry in here.door.log())
     assert not here.door.state()["booting"]
@@ -327,6 +361,9 @@ CASES = (
     Case("MJPEG", "ON", streams, after=ordered("MJPEG", "OFF")),
     Case("Mirror", "False", option("VideoInOptions[0].Mirror", "false"), after=ordered("Mirror", "True")),
     Case("Flip", "0", option("VideoInOptions[0].Flip", "false"), after=ordered("Flip", "1")),
+    Case("Privacy", "ON", option("LeLensMask[0].Enable", "true", "LeLensMask"), after=ordered("Privacy", "OFF")),
+    Case("AudioRec", "1", hears_the_tone, a_tone),
+    Case("AudioPlay", "ding.wav", is_played, a_file),
     Case("VideoMode", "bw", option("VideoInOptions[0].DayNightColor", "2"), after=ordered("VideoMode", "color")),
     Case("VideoMode", "scan", high_contrast, after=usual_contrast),
     Case("Scan", ONE_PLACE, found),
@@ -354,3 +391,7 @@ def test_an_order_does_what_it_says_and_is_answered_step_by_step(case: Case, her
     assert len({answer.id for answer in answers}) == 1
     case.effect(here)
     case.after(here)
+
+
+def test_every_order_is_in_the_table() -> None:
+    assert {case.key for case in CASES} == {name for name, _ in orders.KEYS.values()} | {"Position"}
