@@ -27,7 +27,7 @@ from services.topic import LEVELS
 
 M = TypeVar("M", bound=BaseModel)
 TOP = ("bus", "state", "home", "default_camera", "grouped")
-INJECTED = ("name", "home", "cameras", "folder")  # see `section.py`
+INJECTED = ("name", "home", "cameras", "folder", "state")  # see `section.py`
 
 
 class Tls(Section):
@@ -112,14 +112,15 @@ def load(
     top = _model(Top, {key: raw[key] for key in TOP if key in raw}, source, ())
     home, home_faults = _home(file.parent / raw["home"]) if isinstance(raw.get("home"), str) else (None, [])
     cameras = _cameras(raw, source)
-    given = {"home": home, "cameras": cameras, "folder": file.parent}
+    state = _state_folder(top or Top(home=file), file, environment)
+    given = {"home": home, "cameras": cameras, "folder": file.parent, "state": state}
     _unknown_sections(raw, source)
     _misnamed_cameras(raw, source)
     instances = {one.name: one for one in _instances(raw, source, cameras, given)}
     faults = [*_wanted(source.faults, only), *home_faults, *(check_files(instances) if deep else [])]
     if faults or top is None or home is None:
         raise ConfigError(sorted(dict.fromkeys(faults), key=_by_place))
-    return Apartment(file, top.bus, home, _state_folder(top, file, environment), cameras, top.grouped, instances)
+    return Apartment(file, top.bus, home, state, cameras, top.grouped, instances)
 
 
 def _by_place(fault: str) -> tuple[str, int]:

@@ -52,6 +52,10 @@ class Bulletin:
             self._turned_at = at
         self.reading, self._read_at = reading, at
 
+    def rests(self, reading: Reading, at: float) -> None:
+        """It was seen to come to rest there, which one reading does not tell."""
+        self.turning, self.reading, self._read_at = False, reading, at
+
     def known(self) -> Reading:
         """The newest reading; Refused when there is none."""
         if self.reading is None:

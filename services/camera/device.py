@@ -13,13 +13,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from typing import Protocol
+from typing import Final, Literal, Protocol
 
 from services.bus import Message
 from services.camera.requests import (
+    Away,
     Camera,
     Direction,
     GotoPreset,
+    MoveOver,
+    MoveTo,
     Rank,
     Reading,
     Refused,
@@ -28,16 +31,19 @@ from services.camera.requests import (
     Start,
     Status,
     Stop,
+    TurnFor,
 )
 from services.errors import DeviceError
 from services.runner import Post
 
 REPLY = "/camera/reply"
-STILL_DEG = 0.15  # two readings nearer than this are the same: the resolution is 0.1 degree
+STILL_DEG = 0.25  # two readings nearer than this are the same: the resolution is 0.1 degree, and some dither by that
 END_S = 3.5  # the end of the service waits so long for a camera to stand still; then its watchdog goes on
 
-Turning = Callable[[Direction | None], None]
+DRIVE: Final = "drive"  # what turns when the firmware drives by itself
+Turning = Callable[[Direction | Literal["drive"] | None], None]
 
+FIRMWARE = GotoPreset | MoveTo | MoveOver | TurnFor
 log = logging.getLogger(__name__)
 
 
@@ -71,12 +77,16 @@ class Lane:
         post: Post,
         clock: Callable[[], float],
         turning: Turning = lambda direction: None,
+        owing: Callable[[bool], None] = lambda on: None,
     ) -> None:
         self.camera = camera
+        self.owing = owing
         self.post = post
         self.clock = clock
         self.turning = turning
         self.started = False  # a motion may be running
+        self._driven: Reading | None = None  # the last reading since the firmware began to drive
+        self._drives = False
         self._waiting: list[_Waiting] = []
         self._numbers = itertools.count()
         self._changed = threading.Condition()
@@ -114,11 +124,16 @@ class Lane:
             try:
                 result = self._send(waiting.request)
             except DeviceError as error:
+                if isinstance(error, Away) and self.started:
+                    self.owing(True)
+                elif isinstance(waiting.request, Stop):
+                    self.owing(False)  # it has arrived, whatever the camera thinks of it
                 self._answer(waiting, None, error, sent)
             else:
                 self._answer(waiting, result, None, sent)
         if self.started and stand_still(self.camera, self.clock):
             self.turning(None)
+        self.owing(False)
         self.camera.close()
 
     def _next(self) -> _Waiting | None:
@@ -127,15 +142,21 @@ class Lane:
             return heappop(self._waiting) if self._waiting else None
 
     def _send(self, request: Request) -> object:
-        if isinstance(request, Start | GotoPreset):
+        if isinstance(request, Start | FIRMWARE):
             self.started = True  # before it is sent: a start whose answer is lost may have been heard
-        if isinstance(request, Start):
-            self.turning(request.direction)
+            self._drives, self._driven = isinstance(request, FIRMWARE), None
+            self.turning(request.direction if isinstance(request, Start) else DRIVE)
         result = self.camera.send(request)
-        if isinstance(request, Stop):
-            self.started = False
+        if isinstance(request, Stop) or (isinstance(result, Reading) and self._has_driven(result)):
+            self.started = self._drives = False
             self.turning(None)
+            self.owing(False)
         return result
+
+    def _has_driven(self, reading: Reading) -> bool:
+        """Whether what the firmware drove by itself stands; nobody stops that."""
+        before, self._driven = self._driven, reading
+        return self._drives and before is not None and reading.moving is not True and same(before, reading)
 
     def _answer(self, waiting: _Waiting, result: object, error: DeviceError | None, sent: float) -> None:
         reply = Reply(waiting.request, waiting.ticket, result, error, sent, self.clock())
@@ -143,7 +164,10 @@ class Lane:
 
 
 class Device:
-    """A Sender for a camera on the network; `turning` is told what turns, before it does (`watchdog.py`)."""
+    """A Sender for a camera on the network; `turning` is told what turns, before it does (`watchdog.py`).
+
+    `owing` is told when the camera was lost while it turned, and when the stop that it is owed was confirmed.
+    """
 
     def __init__(
         self,
@@ -151,8 +175,9 @@ class Device:
         post: Post,
         clock: Callable[[], float] = time.time,
         turning: Turning = lambda direction: None,
+        owing: Callable[[bool], None] = lambda on: None,
     ) -> None:
-        self.control = Lane("camera control", connect(), post, clock, turning)
+        self.control = Lane("camera control", connect(), post, clock, turning, owing)
         self.pictures = Lane("camera pictures", connect(), post, clock)
 
     def submit(self, request: Request, ticket: int) -> None:
@@ -169,13 +194,24 @@ class Device:
 
 
 def stand_still(
-    camera: Camera, clock: Callable[[], float], limit_s: float = END_S, *, direction: Direction | None = None
+    camera: Camera,
+    clock: Callable[[], float],
+    limit_s: float = END_S,
+    *,
+    direction: Direction | Literal["drive"] | None = None,
 ) -> bool:
-    """Sends a stop until it is confirmed and two readings are equal; whether that was so within the limit."""
+    """Sends a stop until it is confirmed and two readings are equal; whether that was so within the limit.
+
+    What the firmware drives by itself has no stop of its own everywhere: a slow start takes its place, which has.
+    """
     end = clock() + limit_s
-    every = False
+    every, drives = False, direction == DRIVE
+    if direction == DRIVE:
+        direction = Direction.LEFT
     while clock() < end:
         try:
+            if drives:
+                camera.send(Start(Direction.LEFT))
             camera.send(Stop(every=every, direction=direction))
             readings = [camera.send(Status()) for _ in range(3)]  # the first may lag behind the motor
         except DeviceError as error:

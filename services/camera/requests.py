@@ -76,6 +76,38 @@ class Start:
 
 
 @dataclass(frozen=True)
+class TurnFor:
+    """Turn for some seconds and end by itself; percent of the top speed, -100 to 100. Newer firmware only."""
+
+    right: int
+    down: int
+    zoom: int
+    seconds: float
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
+class MoveTo:
+    """Let the firmware drive to readings. `form`: it has one of two ways to say that, or none."""
+
+    pan: float
+    tilt: float
+    zoom: float
+    form: Literal["PositionABS", "moveAbsolutely"] = "PositionABS"
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
+class MoveOver:
+    """Let the firmware drive on by parts of its whole scale, -1 to 1; what that is in degrees is learnt."""
+
+    right: float
+    down: float
+    form: Literal["Position", "moveRelatively"] = "Position"
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
 class Stop:
     """End all motion. `every`: whatever may be running, also what somebody else started; `direction`: this one."""
 
@@ -169,6 +201,9 @@ class Errand:
 
 Request = (
     Start
+    | TurnFor
+    | MoveTo
+    | MoveOver
     | Stop
     | Status
     | GotoPreset

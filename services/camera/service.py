@@ -16,6 +16,7 @@ from services.camera.alarm.listener import HEARD, Heard
 from services.camera.alarm.motion import MotionWatch
 from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
+from services.camera.capabilities import Abilities
 from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.device import REPLY, Sender
 from services.camera.discovery import Discovery
@@ -23,10 +24,8 @@ from services.camera.health import IDLE_S, Health
 from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
-from services.camera.ptz.goal import Goal
+from services.camera.ptz.errands import Errands
 from services.camera.ptz.motors import Motors
-from services.camera.ptz.move import goto
-from services.camera.ptz.pace import Skill
 from services.camera.requests import GetPicture, Identify, Identity, Picture, Rank, Reading, Refused, Reply, Status
 from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
@@ -41,7 +40,6 @@ from services.payloads import Order, OrderState, PositionSet
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
 STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
-FRESH_S = 3.0  # a reading as old as this still tells where a camera at rest looks
 
 
 class CameraService:
@@ -73,21 +71,21 @@ class CameraService:
         publish = self._out.append
         self.places = Places(config.folder / config.places)
         self.health = Health(config.name)
-        self.skill = Skill()
-        self.skill.forget_senses(flip=config.picture.flip, mirror=config.picture.mirror)
         self.bulletin = Bulletin(config.name, self.health, self.places, publish)
         self.bulletin.diagnostics = config.diagnostics
         self.discovery = Discovery(config.name, publish, on=config.discovery)
         self.answers = Answers(config.name, publish, self.bulletin.position)
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
-        self.scanner = Scanner(config, self.skill, eye, analyst, self.bulletin, self.places)
+        self.errands = Errands(config, self.bulletin, self.places)
+        self.scanner = Scanner(config, self.errands.skill, eye, analyst, self.bulletin, self.places)
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
         self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes)
         self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=config.alarm)
         self.upkeep = Upkeep(config.name, config.clock, self.bulletin.facts, self._has_time)
+        self.abilities = Abilities(config.state and config.state / f"{config.name}-can.json", self._has_time)
         self._polling = False
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
@@ -149,6 +147,8 @@ class CameraService:
             self._begin(self.feed.at_motion(motion.value), now)
         self.bulletin.facts.values["alarm"] = self.motion.fact
         self.bulletin.facts.complain("alarm", f"motion alarm {self.motion.fact}" if self.motion.trouble else "")
+        if self.abilities.present is not None:
+            self.bulletin.facts.values["can"] = self.abilities.present.words
         self.bulletin.facts.values["request_queue"] = str(len(self.stage.asked))
 
     def _has_time(self) -> bool:
@@ -178,14 +178,14 @@ class CameraService:
             self._take_picture(reply.result)
         elif isinstance(reply.result, Identity):
             self.bulletin.identity = reply.result
+            self.errands.meet(reply.result)
         self.stage.reply(reply, now)
 
     def _take_picture(self, picture: Picture) -> None:
-        """The motors follow the picture: when its options changed, which way they turn is to be seen anew."""
+        """The motors and the streams follow the picture."""
         old, self.scanner.picture = self.scanner.picture, picture
         self.feed.turned(picture)
-        if (picture.flip, picture.mirror) != (old.flip, old.mirror):
-            self.skill.forget_senses(flip=picture.flip, mirror=picture.mirror)
+        self.errands.see(picture, old)
 
     def _poll(self, now: float) -> Plan[None]:
         """Asks where the camera looks while nobody else does, and who it is after it was away."""
@@ -201,6 +201,7 @@ class CameraService:
                 self.health.next_poll += REST_S - IDLE_S
             if self.health.online and not met:
                 yield from attempt(Identify())
+                self.stage.begin(self.abilities.meet(self.bulletin.identity, now), now, _nobody)
                 now = (yield from attempt(GetPicture())).received
                 self.upkeep.met()
                 if self.bulletin.turning:
@@ -257,7 +258,7 @@ class CameraService:
         if not free and not self.health.online:
             raise Refused(f"the camera is {self.health.state}: {self.health.reason}")
         if isinstance(command, GotoPlace | LookAt):
-            self._goal(command)
+            self.errands.goal(command)
         elif isinstance(command, orders.RemovePlace):
             self.places.get(command.place)
         elif isinstance(command, orders.Broadcast):
@@ -265,24 +266,11 @@ class CameraService:
         elif isinstance(command, ScanFor):
             self.scanner.check(command)
 
-    def _goal(self, command: GotoPlace | LookAt) -> Goal:
-        """Where an order wants to look; what it leaves out stays as it is."""
-        here = self.bulletin.known()
-        if isinstance(command, GotoPlace):
-            place = self.places.get(command.place)
-            return self.config.limits.goal(place.pan, place.tilt, place.zoom)
-        pan = here.pan if command.pan is None else command.pan
-        tilt = here.tilt if command.tilt is None else command.tilt
-        zoom = here.zoom if command.zoom is None else command.zoom
-        return self.config.limits.goal(pan, tilt, zoom)
-
     def _motor_plan(self, command: Command, now: float) -> Plan[object]:
         if isinstance(command, ScanFor):
             return self.scanner.plan(command, now)
         assert isinstance(command, GotoPlace | LookAt)
-        near = self.bulletin.at_rest(now, FRESH_S)
-        until = now + self.config.move_timeout_s
-        return goto(self._goal(command), self.config.limits, self.skill, until, near=near)
+        return self.errands.plan(command, now)
 
     def _motor_ended(self, job: Job, state: OrderState, error: str | None, now: float) -> None:
         if isinstance(job.command, ScanFor):

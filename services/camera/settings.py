@@ -77,10 +77,11 @@ class MountSettings(Section):
 
 
 class Config(Section):
-    """One camera. `name` and `folder` are given by the program."""
+    """One camera. `name`, `folder` and `state` are given by the program."""
 
     name: str = "ip1"
     folder: Path = Path()
+    state: Path | None = None  # where what is learnt of the camera is kept; None: nowhere
     profile: Literal["full", "low"] = "full"  # "low": what is not given is as in LOW
     brand: str = "amcrest"  # a module of `camera/brands/`
     url: str

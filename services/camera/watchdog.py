@@ -17,12 +17,12 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from types import ModuleType
-from typing import Protocol, cast
+from typing import Literal, Protocol, cast
 
 from pydantic import SecretStr
 
 from services.camera.address import Address
-from services.camera.device import stand_still
+from services.camera.device import DRIVE, stand_still
 from services.camera.requests import Camera, Direction, Status
 from services.camera.web.gate import Gate
 from services.errors import DeviceError
@@ -45,9 +45,9 @@ class Watchdog:
         content = {**vars(address), "password": address.password.get_secret_value()}
         self._write(json.dumps({"brand": brand, "address": content}))
 
-    def tell(self, direction: Direction | None) -> None:
+    def tell(self, direction: Direction | Literal["drive"] | None) -> None:
         """What turns from now on; None: nothing."""
-        self._write(STILL if direction is None else direction.name)
+        self._write(direction.name if isinstance(direction, Direction) else direction or STILL)
 
     def close(self) -> None:
         """Lets it see the end of the pipe."""
@@ -94,9 +94,9 @@ def watch(lines: Iterable[str], connect: Callable[[], Camera], clock: Callable[[
     At the first motion it logs in, so that the stop itself needs one request only.
     """
     camera: Camera | None = None
-    turning: Direction | None = None
+    turning: Direction | Literal["drive"] | None = None
     for line in lines:
-        turning = None if line.strip() == STILL else Direction[line.strip()]
+        turning = _told(line.strip())
         if turning is not None and camera is None:
             camera = connect()
             _greet(camera)
@@ -106,6 +106,12 @@ def watch(lines: Iterable[str], connect: Callable[[], Camera], clock: Callable[[
         stand_still(camera, clock, STOP_S, direction=turning)
     camera.close()
     return turning is not None
+
+
+def _told(word: str) -> Direction | Literal["drive"] | None:
+    if word == STILL:
+        return None
+    return DRIVE if word == DRIVE else Direction[word]
 
 
 def _greet(camera: Camera) -> None:

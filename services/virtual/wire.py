@@ -19,22 +19,16 @@ class Wire(httpx.BaseTransport):
         self.now = 0.0
 
     def handle_request(self, request: httpx.Request) -> httpx.Response:
-        """One request and its answer; authentication as on the real wire. ConnectError: it restarts."""
-        if self.inside.device.booting(self.now):
-            raise httpx.ConnectError("nobody listens", request=request)
+        """One request and its answer; authentication as on the real wire."""
         target = request.url.raw_path.decode()
         verdict = self.inside.door.judge(request.method, target, request.headers.get("Authorization"), self.now)
         if not verdict.passed:
             challenges = [("WWW-Authenticate", challenge) for challenge in verdict.challenges]
             return httpx.Response(401, headers=challenges, content=verdict.body)
-        return self._picture(request) if "/snapshot.cgi" in target else self._control(target)
+        return self._picture() if "/snapshot.cgi" in target else self._control(target)
 
-    def _picture(self, request: httpx.Request) -> httpx.Response:
+    def _picture(self) -> httpx.Response:
         self.now += self.inside.device.latency.snapshot()
-        if how := self.inside.device.drops_snapshot():
-            if how == "close":
-                raise httpx.ReadError("closed without an answer", request=request)
-            return httpx.Response(200, content=b"busy\r\n")
         content = self.inside.pictures.jpeg("MainFormat", self.now)
         return httpx.Response(200, headers={"Content-Type": "image/jpeg"}, content=content)
 

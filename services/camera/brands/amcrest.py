@@ -18,6 +18,8 @@ from services.camera.requests import (
     GotoPreset,
     Identify,
     Identity,
+    MoveOver,
+    MoveTo,
     Picture,
     Reboot,
     Refused,
@@ -28,6 +30,7 @@ from services.camera.requests import (
     Start,
     Status,
     Stop,
+    TurnFor,
 )
 from services.camera.sound.desk import Sound
 from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch
@@ -51,7 +54,7 @@ class Amcrest:
         self.login = Login(address.user, address.password, gate or Gate(), urgent=urgent)
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
-        self.running: Direction | None = None
+        self.running: str | None = None  # the code of the motion that may be under way
         self._in_day_night = False  # the firmware keeps the mode in VideoInDayNight
 
     def close(self) -> None:
@@ -63,12 +66,15 @@ class Amcrest:
         match request:
             case Start():
                 return self._start(request)
+            case TurnFor() | MoveTo() | MoveOver():
+                return self._drive(request)
             case Stop():
                 return self._stop(request)
             case Status():
                 return ptz.read_status(self._status())
             case GotoPreset(number) | SavePreset(number) | ClearPreset(number):
                 code = {GotoPreset: "GotoPreset", SavePreset: "SetPreset", ClearPreset: "ClearPreset"}[type(request)]
+                self.running = code if isinstance(request, GotoPreset) else self.running
                 return self._command(ptz.preset(code, number, self._known_channel()))
             case Snapshot():
                 return self._snapshot()
@@ -96,20 +102,33 @@ class Amcrest:
 
     def _start(self, request: Start) -> object:
         channel = self._known_channel()
-        self.running = request.direction
+        self.running = ptz.code_of(request.direction)
         return self._command(ptz.start(request, channel))
+
+    def _drive(self, request: TurnFor | MoveTo | MoveOver) -> object:
+        channel = self._known_channel()
+        if isinstance(request, TurnFor):
+            self.running = "Continuously"
+            return self._command(ptz.turn_for(request, channel))
+        if isinstance(request, MoveTo):
+            self.running = request.form
+            return self._command(ptz.move_to(request, channel))
+        self.running = request.form
+        return self._command(ptz.move_over(request, channel))
 
     def _stop(self, request: Stop) -> object:
         channel = self._known_channel()
+        if self.running in ptz.UNSTOPPABLE:  # a start takes its place, and that can be stopped
+            self._start(Start(Direction.LEFT))
         refused: list[Refused] = []
-        known = request.direction or self.running
-        directions = [known] if known is not None and not request.every else list(Direction)
-        for direction in directions:
+        known = ptz.code_of(request.direction) if request.direction else self.running
+        codes = [known] if known is not None and not request.every else [*map(ptz.code_of, Direction)]
+        for code in codes:
             try:
-                self._command(ptz.stop(direction, channel), STOP)
+                self._command(ptz.stop(code, channel), STOP)
             except Refused as error:  # firmware that refuses to stop what does not run
                 refused.append(error)
-        if len(refused) == len(directions):
+        if len(refused) == len(codes):
             raise refused[0]
         return None
 

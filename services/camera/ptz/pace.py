@@ -1,107 +1,196 @@
-"""What is learnt about a camera's motors: how fast each speed is, how late a stop takes effect, which way is which.
+"""One axis: how far it goes for what it was told, and what its readings teach about that.
 
-The travel of start, wait `held` seconds, stop is `rate * (held + delay)`: affine in the time (the tables of
-pyronear/pyro-engine show R^2 of 0.97 to 0.999). What was never tried is scaled by what was.
+A motor follows the speed it was told with some acceleration; a command acts when it is answered, a reading tells how
+it was when it was asked for: each give or take something that is learnt. A Kalman filter keeps the guess and its
+doubt, so the first reading of a new camera counts for much and the thousandth for little, and what is learnt of one
+speed says something about its neighbours. Not here: what goes for all axes (`skill.py`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from statistics import median
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 PAN_RATES = (1.0, 3.0, 6.0, 10.0, 16.0, 24.0, 34.0, 45.0)  # degrees/s, a guess to begin with
 TILT_RATES = tuple(0.6 * rate for rate in PAN_RATES)
-ZOOM_RATES = (1.0,)  # levels/s; there is one speed
-DELAY_S = 0.3  # of one command over the camera's HTTP
-KEEP = 10  # samples of each speed: motors and networks change slowly
-SPREAD_S = 0.5  # times that differ less cannot tell rate and delay apart
+ZOOM_RATES = (3.0,)  # levels/s; there is one speed
+
+# What is learnt beside the rates, with a first guess and its doubt: seconds per (degree/s) of half a change of speed,
+# how much later stops act than starts, the age of a reading (below 0: from before it was asked for), and how much of
+# an unusually long answer falls before a reading is taken, and after a command has acted.
+HALF_CHANGE, STOP_LATE, READ_LATE, READ_PART, ACT_PART = range(5)
+FIRST = (0.005, 0.0, 0.0, 0.4, 0.15)
+DOUBT = (0.006, 0.04, 0.12, 0.4, 0.2)
+LEAST = (0.0002, -0.3, -1.0, 0.0, 0.0)
+MOST = (0.05, 0.6, 1.0, 1.0, 1.0)
+RATE_DOUBT = 0.7  # of the guess
+SLOWEST = 0.05
+DRIFT = 0.002  # of each rate, per motion: motors age
+OUTLIER = 3.0  # standard deviations; beyond, a reading counts for less
+
+
+class Told(NamedTuple):
+    """A command as one axis sees it: when it was answered, how much later than usual, and the speed with its sign."""
+
+    at: float
+    late: float
+    level: int
+
+
+class Seen(NamedTuple):
+    """A reading as one axis sees it: when it was asked for, how much later than usual it came, how far it has come."""
+
+    at: float
+    late: float
+    travel: float
+    noise: float  # standard deviation
+
+
+Vector = NDArray[np.float64]
+
+
+def _prior(guess: Sequence[float]) -> tuple[Vector, Vector]:
+    rates = np.array(guess, float)
+    steps = np.arange(len(rates))
+    alike = 0.5 + 0.5 * np.exp(-np.abs(steps[:, None] - steps[None, :]) / 2.0)
+    cov = np.zeros((len(rates) + 5, len(rates) + 5))
+    cov[: len(rates), : len(rates)] = RATE_DOUBT**2 * alike * np.outer(rates, rates)
+    cov[len(rates) :, len(rates) :] = np.diag(np.square(DOUBT))
+    return np.concatenate([rates, np.array(FIRST)]), cov
 
 
 @dataclass
 class Pace:
-    """One axis."""
+    """What is known of one axis: the numbers and their covariance."""
 
     guess: tuple[float, ...]
-    delay: float = DELAY_S
-    samples: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
-    seen: dict[int, float] = field(default_factory=dict)  # rates read while it turned
+    mean: Vector = field(default_factory=lambda: np.zeros(0))
+    cov: Vector = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        if not len(self.mean):
+            self.mean, self.cov = _prior(self.guess)
 
     @property
     def speeds(self) -> range:
         """The speeds that there are, the slowest first."""
         return range(1, len(self.guess) + 1)
 
-    def learn(self, speed: int, held: float, travel: float) -> None:
-        """Takes in one finished motion; `travel` is positive in the direction that was asked for."""
-        if travel > 0:
-            self.samples.setdefault(speed, []).append((held, travel))
-            del self.samples[speed][:-KEEP]
-            self._learn_delay(speed, held, travel)
-
-    def learn_rate(self, speed: int, rate: float) -> None:
-        """Takes in a rate read while it turned: degrees/s."""
-        if rate > 0:
-            old = self.seen.get(speed, rate)
-            self.seen[speed] = 0.5 * (old + rate)
-
     def rate(self, speed: int) -> float:
-        """Degrees (levels) per second."""
-        if speed in self.seen:
-            return self.seen[speed]
-        if speed in self.samples:
-            return self._fitted(speed)
-        known = {*self.seen, *self.samples}
-        factor = median(self.rate(one) / self.guess[one - 1] for one in known) if known else 1.0
-        return self.guess[speed - 1] * factor
+        """Degrees (levels) per second, positive."""
+        return max(SLOWEST, float(self.mean[speed - 1]))
 
-    def held(self, speed: int, travel: float) -> float:
-        """How long to wait between start and stop; negative when even no wait is too far."""
-        return travel / self.rate(speed) - self.delay
+    def doubt(self, speed: int) -> float:
+        """The standard deviation of a rate."""
+        return float(np.sqrt(self.cov[speed - 1, speed - 1]))
 
-    def _fitted(self, speed: int) -> float:
-        """Least squares through the samples where their times differ enough, else the mean over a known delay."""
-        samples = self.samples[speed]
-        times = [held for held, _ in samples]
-        mean_time = sum(times) / len(samples)
-        mean_travel = sum(travel for _, travel in samples) / len(samples)
-        if max(times) - min(times) >= SPREAD_S:
-            across = sum((held - mean_time) * (travel - mean_travel) for held, travel in samples)
-            slope = across / sum((held - mean_time) ** 2 for held in times)
-            if slope > 0:
-                return slope
-        return mean_travel / (mean_time + self.delay)
+    def known(self, speed: int) -> bool:
+        """Whether a rate is known well enough to time a stop by it."""
+        return self.doubt(speed) < 0.05 * self.rate(speed)
 
-    def _learn_delay(self, speed: int, held: float, travel: float) -> None:
-        """Short motions are nearly all delay; long ones tell nothing about it."""
-        if held < 1.0 and (speed in self.seen or len(self.samples[speed]) > 1):
-            found = travel / self.rate(speed) - held
-            self.delay = min(1.5, max(0.0, self.delay + 0.25 * (found - self.delay)))
+    def other(self, which: int) -> float:
+        """One of the numbers beside the rates."""
+        return min(MOST[which], max(LEAST[which], float(self.mean[len(self.guess) + which])))
+
+    def other_doubt(self, which: int) -> float:
+        """Its standard deviation."""
+        number = len(self.guess) + which
+        return float(np.sqrt(self.cov[number, number]))
+
+    def change(self, speed: int, to: int = 0) -> float:
+        """How long a change of speed takes, seconds."""
+        return 2 * self.other(HALF_CHANGE) * abs((self.rate(speed) if speed else 0) - (self.rate(to) if to else 0))
+
+    def travel(self, told: Sequence[Told], at: float) -> float:
+        """How far it has come at a time, from rest before the first command."""
+        return _travel(self.mean, len(self.guess), told, at)[0]
+
+    def velocity(self, told: Sequence[Told], at: float) -> float:
+        """How fast it goes at a time."""
+        return _travel(self.mean, len(self.guess), told, at)[1]
+
+    def seen_at(self, asked: float, late: float) -> float:
+        """The time of which a reading tells."""
+        return asked + self.other(READ_LATE) + self.other(READ_PART) * late
+
+    def expected(self, told: Sequence[Told], seen: Seen) -> tuple[float, float]:
+        """What a reading should show, and the doubt about that."""
+        value, slope = self._slope(told, seen)
+        return value, float(np.sqrt(slope @ self.cov @ slope))
+
+    def learn(self, told: Sequence[Told], seen: Seen) -> None:
+        """Takes in one reading."""
+        expected, slope = self._slope(told, seen)
+        wrong = seen.travel - expected
+        spread = float(slope @ self.cov @ slope) + seen.noise**2
+        if wrong * wrong > OUTLIER**2 * spread:
+            spread = wrong * wrong / OUTLIER**2
+        gain = self.cov @ slope / spread
+        self.mean = self.mean + gain * wrong
+        self.cov = self.cov - np.outer(gain, slope @ self.cov)
+        self.cov = (self.cov + self.cov.T) / 2
+        self._keep_within()
+
+    def borrow(self, better: Pace) -> None:
+        """Takes over what an axis with finer readings knows of the timing of answers."""
+        for which in (READ_LATE, READ_PART, ACT_PART):
+            number, other = len(self.guess) + which, len(better.guess) + which
+            self.mean[number] = better.mean[other]
+            self.cov[number, :] = self.cov[:, number] = 0.0
+            self.cov[number, number] = better.cov[other, other]
+
+    def age(self) -> None:
+        """A motion is over: motors and networks change, so nothing stays known for ever."""
+        count = len(self.guess)
+        index = np.arange(count)
+        self.cov[index, index] += np.square(DRIFT * self.mean[:count])
+        rest = np.arange(count, count + 5)
+        self.cov[rest, rest] += np.square(0.01 * np.array(DOUBT))
+
+    def _keep_within(self) -> None:
+        count = len(self.guess)
+        self.mean[:count] = np.maximum(self.mean[:count], SLOWEST)
+        self.mean[count:] = np.clip(self.mean[count:], LEAST, MOST)
+
+    def _slope(self, told: Sequence[Told], seen: Seen) -> tuple[float, Vector]:
+        """What a reading should show, and how that changes with each number."""
+        count = len(self.guess)
+        used = {abs(one.level) - 1 for one in told if one.level}
+        slope = np.zeros(count + 5)
+        value = self._shown(self.mean, told, seen)
+        for number in (*used, *range(count, count + 5)):
+            step = max(1e-4, 1e-3 * abs(self.mean[number]))
+            moved = self.mean.copy()
+            moved[number] += step
+            slope[number] = (self._shown(moved, told, seen) - value) / step
+        return value, slope
+
+    def _shown(self, mean: Vector, told: Sequence[Told], seen: Seen) -> float:
+        count = len(self.guess)
+        at = seen.at + float(mean[count + READ_LATE]) + float(mean[count + READ_PART]) * seen.late
+        return _travel(mean, count, told, at)[0]
 
 
-@dataclass
-class Sense:
-    """Which way the reading goes when the camera is told right, down or in: +1 or -1; `sure` once it was seen."""
-
-    sign: int = 1
-    sure: bool = False
-
-
-@dataclass
-class Skill:
-    """All that is learnt about one camera, for pan, tilt and zoom."""
-
-    paces: tuple[Pace, Pace, Pace] = field(
-        default_factory=lambda: (Pace(PAN_RATES), Pace(TILT_RATES), Pace(ZOOM_RATES))
-    )
-    senses: tuple[Sense, Sense, Sense] = field(default_factory=lambda: (Sense(), Sense(), Sense(sure=True)))
-    diagonals: bool = True
-    lag: float = 0.4  # s from a reading in motion to the effect of a stop sent at once
-
-    def forget_senses(self, *, flip: bool, mirror: bool) -> None:
-        """The picture's options changed, and these swap the motors: guess, and look at the next motion."""
-        self.senses[0].sign, self.senses[0].sure = (1 if mirror else -1), False
-        self.senses[1].sign, self.senses[1].sure = (1 if flip else -1), False
-
-    def learn_lag(self, found: float) -> None:
-        """Takes in one measured lag."""
-        self.lag = min(1.5, max(0.0, self.lag + 0.3 * (found - self.lag)))
+def _travel(mean: Vector, count: int, told: Sequence[Told], at: float) -> tuple[float, float]:
+    """How far and how fast: the speed goes straight from each wanted one to the next."""
+    slow = 2 * max(LEAST[HALF_CHANGE], float(mean[count + HALF_CHANGE]))  # seconds for a change by one degree/s
+    late, part = float(mean[count + STOP_LATE]), float(mean[count + ACT_PART])
+    place = speed = wanted = 0.0
+    begun: float | None = None
+    for one in (*told, None):
+        acts = at if one is None else min(at, one.at - part * one.late + (late if one.level == 0 else 0.0))
+        if begun is not None and acts > begun:
+            seconds = acts - begun
+            changing = min(seconds, slow * abs(wanted - speed))
+            before = speed
+            if changing:
+                speed += (changing / slow) * (1 if wanted > speed else -1)
+            place += (before + speed) / 2 * changing + wanted * (seconds - changing)
+        begun = acts if begun is None else max(begun, acts)
+        if one is not None and acts < at:
+            wanted = 0.0 if one.level == 0 else (1 if one.level > 0 else -1) * float(mean[abs(one.level) - 1])
+    return place, speed

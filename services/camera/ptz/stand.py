@@ -12,7 +12,7 @@ from services.camera.plan import Plan, ask, attempt, wait
 from services.camera.requests import BadLogin, Direction, Locked, Reading, Refused, Reply, Start, Status, Stop
 from services.errors import DeviceError
 
-GAP_S = 0.25  # between two readings that are compared: the slowest speed shows in that time
+GAP_S = 0.45  # between two readings that are compared: the slowest speed shows in that time
 REFUSALS = 3
 LOCKED_PAUSE_S = 60.0  # a camera that takes no login takes no stop either, and each try may lock the account
 

@@ -15,7 +15,7 @@ from services.camera.bulletin import Bulletin
 from services.camera.orders import ScanFor
 from services.camera.places import Places
 from services.camera.plan import Plan, attempt
-from services.camera.ptz.pace import Skill
+from services.camera.ptz.skill import Skill
 from services.camera.requests import GetPicture, Picture, Refused
 from services.camera.scan import sightings
 from services.camera.scan.analysis import Analysed, Analyst, Task

@@ -14,7 +14,7 @@ from typing import Literal, cast
 from services.camera.plan import Plan, ask, attempt, wait
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
-from services.camera.ptz.pace import Skill
+from services.camera.ptz.skill import Skill
 from services.camera.requests import Away, Reading, Snapshot
 from services.camera.scan.analysis import Analysed
 from services.camera.scan.sightings import Sighting, between

@@ -49,16 +49,6 @@ def test_the_challenge_has_the_captured_form() -> None:
     assert ', qop="auth", nonce=' in spaced
 
 
-def test_the_oldest_firmware_has_the_form_of_the_document() -> None:
-    door = _door(Profile(realm="mac"))
-    first = door.judge("GET", TARGET, None, 0.0).challenges[0]
-    assert [part.partition("=")[0] for part in first.split(",")[1:]] == ["nonce", "stale", "qop"]
-    assert "stale=FALSE" in first
-    nonce = _nonce(door.judge("GET", TARGET, None, 0.0))
-    assert door.judge("GET", TARGET, _header(nonce), 0.0).passed
-    assert "stale=TRUE" in door.judge("GET", TARGET, _header(nonce), 0.0).challenges[0]
-
-
 def test_the_right_password_passes_and_a_wrong_one_does_not() -> None:
     door = _door()
     nonce = _nonce(door.judge("GET", TARGET, None, 0.0))

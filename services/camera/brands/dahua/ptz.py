@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from services.camera.brands.dahua.replies import read_table
-from services.camera.requests import Away, Direction, Reading, Start
+from services.camera.requests import Away, Direction, MoveOver, MoveTo, Reading, Start, TurnFor
 
 CODES = {
     Direction.LEFT: "Left",
@@ -21,9 +21,14 @@ CODES = {
 }
 
 
-def ptz(action: str, code: str, channel: int, arguments: tuple[int, int, int] = (0, 0, 0)) -> str:
+UNSTOPPABLE = ("moveAbsolutely", "moveRelatively")  # these have no code that a stop could name
+PLANE = 8191  # the whole scale of the code Position, in units of the picture's plane
+ZOOM_LEVELS = 8.0
+
+
+def ptz(action: str, code: str, channel: int, arguments: tuple[float, ...] = (0, 0, 0)) -> str:
     """The request target of a command to the motors."""
-    args = "".join(f"&arg{index}={value}" for index, value in enumerate(arguments, start=1))
+    args = "".join(f"&arg{index}={value:.12g}" for index, value in enumerate(arguments, start=1))
     return f"/cgi-bin/ptz.cgi?action={action}&channel={channel}&code={code}{args}"
 
 
@@ -39,9 +44,42 @@ def start(request: Start, channel: int) -> str:
     return ptz("start", CODES[request.direction], channel, (0, speed, 0))
 
 
-def stop(direction: Direction, channel: int) -> str:
+def turn_for(request: TurnFor, channel: int) -> str:
+    """Turns for some seconds; up is positive here."""
+    arguments = (request.right, -request.down, request.zoom, round(request.seconds, 2))
+    return ptz("start", "Continuously", channel, arguments)
+
+
+def move_to(request: MoveTo, channel: int) -> str:
+    """Drives to readings; PositionABS counts pan from its end stop, against the reading."""
+    if request.form == "PositionABS":
+        travel = round((180.0 - request.pan) % 360.0, 2)
+        return ptz("start", "PositionABS", channel, (travel, round(request.tilt, 2), round(request.zoom, 2), 8))
+    pan = (request.pan if request.pan <= 180.0 else request.pan - 360.0) / 180.0
+    shares = (round(pan, 6), round(-request.tilt / 180.0, 6), round(request.zoom / ZOOM_LEVELS, 6))
+    return _plain("moveAbsolutely", channel, shares)
+
+
+def move_over(request: MoveOver, channel: int) -> str:
+    """Drives on by parts of the whole scale."""
+    if request.form == "Position":
+        return ptz("start", "Position", channel, (round(request.right * PLANE), round(request.down * PLANE), 0))
+    return _plain("moveRelatively", channel, (round(request.right, 6), round(request.down, 6), 0))
+
+
+def _plain(action: str, channel: int, arguments: tuple[float, ...]) -> str:
+    args = "".join(f"&arg{index}={value:.12g}" for index, value in enumerate(arguments, start=1))
+    return f"/cgi-bin/ptz.cgi?action={action}&channel={channel}{args}"
+
+
+def code_of(direction: Direction) -> str:
+    """What the firmware calls it."""
+    return CODES[direction]
+
+
+def stop(code: str | Direction, channel: int) -> str:
     """Stops the motion of that code."""
-    return ptz("stop", CODES[direction], channel)
+    return ptz("stop", code if isinstance(code, str) else CODES[code], channel)
 
 
 def preset(code: str, number: int, channel: int) -> str:

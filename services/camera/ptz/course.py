@@ -1,0 +1,123 @@
+"""Where the camera is while it turns: what it was told since it last stood, what was read since, what that teaches.
+
+Pure. Not here: what to tell it next (`leg.py`, `move.py`), what is known of its motors (`pace.py`).
+"""
+
+from __future__ import annotations
+
+from services.camera.ptz.goal import Limits, Pose
+from services.camera.ptz.pace import STOP_LATE, Seen, Told
+from services.camera.ptz.skill import Skill
+from services.camera.requests import Reading, Reply
+
+PAN, TILT, ZOOM = range(3)
+READ_DEG = 0.08  # the resolution, and a little dither
+TIME_S = 0.02  # what is left of the timing of a command or a reading when all that is learnt is taken off
+
+
+class Course:
+    """From rest at a pose; levels are speeds with the sign of the reading's change."""
+
+    def __init__(self, limits: Limits, skill: Skill, pose: Pose) -> None:
+        self.limits = limits
+        self.skill = skill
+        self.origin = pose
+        self.told: tuple[list[Told], ...] = ([], [], [])
+        self.shift = [0.0, 0.0, 0.0]  # what readings say beyond the model
+        self.levels = [0, 0, 0]
+
+    def tell(self, reply: Reply, levels: tuple[int, int, int]) -> None:
+        """A command was answered: from then on it turns like this."""
+        late = reply.received - reply.sent - self.skill.timing.usual
+        for axis, level in enumerate(levels):
+            if level != self.levels[axis]:
+                self.told[axis].append(Told(reply.received, late, level))
+                self.levels[axis] = level
+
+    def at(self, axis: int, when: float) -> float:
+        """Where an axis is at a time."""
+        return self.origin[axis] + self.skill.paces[axis].travel(self.told[axis], when) + self.shift[axis]
+
+    def stopped(self, axis: int, when: float) -> float:
+        """Where an axis comes to rest when a command that ends it takes effect at a time."""
+        told = [*self.told[axis], Told(when, 0.0, 0)]
+        pace = self.skill.paces[axis]
+        return self.origin[axis] + pace.travel(told, when + 60.0) + self.shift[axis]
+
+    def end_for(self, axis: int, goal: float, now: float) -> float:
+        """When a command that ends an axis has to take effect for it to rest at the goal; not before now."""
+        level = self.levels[axis]
+        rate = self.skill.paces[axis].rate(abs(level)) * (1 if level > 0 else -1)
+        when = now
+        for _ in range(3):
+            when = max(now, when + (goal - self.stopped(axis, when)) / rate)
+        return when
+
+    def rests_at(self) -> float:
+        """When the axes that were ended stand; those that turn are not asked."""
+        ends = [0.0]
+        for axis, told in enumerate(self.told):
+            pace = self.skill.paces[axis]
+            if told and told[-1].level == 0:
+                before = max((abs(one.level) for one in told), default=0)
+                last = abs(told[-2].level) if len(told) > 1 else before
+                ends.append(told[-1].at + max(0.0, pace.other(STOP_LATE)) + pace.change(last))
+        return max(ends)
+
+    def doubt(self, axis: int, when: float) -> float:
+        """How far the model may be off at a time."""
+        pace = self.skill.paces[axis]
+        return pace.expected(self.told[axis], Seen(when, 0.0, 0.0, 0.0))[1]
+
+    def read(self, reply: Reply, reading: Reading) -> None:
+        """Takes in a reading."""
+        late = reply.received - reply.sent - self.skill.timing.usual
+        pose = self.limits.pose(reading)
+        for axis in (PAN, TILT, ZOOM):
+            told = self.told[axis]
+            if not told or (axis != ZOOM and not self.skill.senses[axis].sure):
+                continue
+            if axis == ZOOM:
+                self.skill.paces[ZOOM].borrow(self.skill.paces[PAN])
+            self._learn(axis, reply, late, pose[axis])
+
+    def _learn(self, axis: int, reply: Reply, late: float, value: float) -> None:
+        pace, told = self.skill.paces[axis], self.told[axis]
+        low, high = self.limits.ranges[axis]
+        seen_at = pace.seen_at(reply.sent, late)
+        speed = abs(pace.velocity(told, seen_at))
+        grid = self.skill.zoom_grid or 1.0 if axis == ZOOM else 0.0
+        noise = 0.3 * grid + READ_DEG
+        changes = [abs(one.level) for one in told]
+        timing = TIME_S * max((pace.rate(level) for level in changes if level), default=0.0)
+        seen = Seen(reply.sent, late, value - self.origin[axis], (noise**2 + (TIME_S * speed) ** 2 + timing**2) ** 0.5)
+        if low + 0.15 < value < high - 0.15:
+            pace.learn(told, seen)
+        if axis != ZOOM or not speed:
+            model = self.origin[axis] + pace.travel(told, pace.seen_at(reply.sent, late))
+            own, read = timing**2 + 0.05**2, noise**2 + (TIME_S * 2 * speed) ** 2
+            self.shift[axis] = (value - model) * own / (own + read)
+
+    def flip(self, axis: int) -> None:
+        """It turned the other way than was thought."""
+        self.told[axis][:] = [one._replace(level=-one.level) for one in self.told[axis]]
+        self.levels[axis] = -self.levels[axis]
+
+    def leave(self, zoom: float) -> None:
+        """The firmware drives on by itself: what was told is over, and where that led will be read."""
+        for told in self.told:
+            told.clear()
+        self.levels = [0, 0, 0]
+        self.origin = (self.origin[PAN], self.origin[TILT], zoom)
+
+    def stand(self, pose: Pose) -> None:
+        """Pan and tilt were read at rest: they start anew from there, and zoom too unless it turns."""
+        for axis in (PAN, TILT, ZOOM):
+            if axis == ZOOM and self.levels[ZOOM]:
+                continue
+            if self.told[axis]:
+                self.skill.paces[axis].age()
+            self.told[axis].clear()
+            self.shift[axis] = 0.0
+        zoom = self.origin[ZOOM] if self.levels[ZOOM] else pose[ZOOM]
+        self.origin = (pose[PAN], pose[TILT], zoom)

@@ -1,0 +1,179 @@
+"""Moves that the camera's firmware makes itself: to a position, to a stored preset, or on by a part of its scale.
+
+Which of them it honours is found out by trying once in the course of a move, and reading back where that led: some
+firmware refuses, some ignores tilt, some is two degrees off. It drives all axes at once and ends by itself, without
+a late stop. Pure. Who decides when to use it is `move.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import atan, degrees, radians, sqrt, tan
+from typing import Literal
+
+from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.goal import Limits, Pose
+from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told
+from services.camera.ptz.skill import Skill
+from services.camera.requests import GotoPreset, MoveOver, MoveTo, Reply
+
+ABSOLUTE: tuple[Literal["PositionABS", "moveAbsolutely"], ...] = ("PositionABS", "moveAbsolutely")
+PRESET_DEG = 2.0  # a preset as near to the goal as that is worth going to
+PRESET_LEVELS = 0.5
+BESIDE_DEG = 6.0  # farther from what was asked for, it was not honoured
+PLANE_DEG = 12.0  # the picture's plane is flat enough for so much
+PLANE_TAN = (1.0, 0.56)  # of the whole scale at the widest zoom, a guess to begin with
+LEAST_DEG = 0.3
+WITHIN_DEG = 0.1  # what is asked for stays so far from an end stop
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One such move: what to send, and where that should lead."""
+
+    request: MoveTo | MoveOver | GotoPreset
+    to: Pose
+
+
+def find(
+    pose: Pose, aim: Pose, limits: Limits, skill: Skill, presets: Mapping[int, tuple[float, float, float]]
+) -> Drive | None:
+    """The firmware's own move to there, or near; None when it has none, or none is worth it.
+
+    It may be asked for the very end of zoom's range, which is the one place where a digital zoom is exact.
+    """
+    for form in ABSOLUTE:
+        if skill.honours.get(form, "unknown") in ("unknown", "yes"):
+            pan, tilt = skill.beside.get(form, (0.0, 0.0))
+            wanted = [
+                min(high - WITHIN_DEG, max(low + WITHIN_DEG, aim[axis] - off))
+                for axis, off, (low, high) in zip((PAN, TILT), (pan, tilt), limits.ranges, strict=False)
+            ]
+            return Drive(MoveTo(wanted[PAN] % 360.0, wanted[TILT], aim[ZOOM], form), aim)
+    far = max(abs(aim[axis] - pose[axis]) for axis in (PAN, TILT))
+    for number, place in {**presets, **skill.presets}.items():
+        there = (limits.unwrap(place[PAN]), place[TILT], place[ZOOM])
+        off = max(abs(there[axis] - aim[axis]) for axis in (PAN, TILT))
+        if off <= PRESET_DEG and far > 2 * PRESET_DEG and abs(there[ZOOM] - aim[ZOOM]) <= PRESET_LEVELS:
+            return Drive(GotoPreset(number), there)
+    return _over(pose, aim, skill)
+
+
+def _over(pose: Pose, aim: Pose, skill: Skill) -> Drive | None:
+    """On by a part of the scale: for what is near, and in the right zoom."""
+    way = [aim[axis] - pose[axis] for axis in (PAN, TILT)]
+    senses = skill.senses[:2]
+    if abs(aim[ZOOM] - pose[ZOOM]) > 1.0 or max(map(abs, way)) > PLANE_DEG:
+        return None
+    if skill.honours.get("Position", "unknown") not in ("unknown", "yes") or not all(one.sure for one in senses):
+        return None
+    planes = plane(pose[ZOOM], skill)
+    parts = [one.sign * tan(radians(off)) / whole for one, off, whole in zip(senses, way, planes, strict=True)]
+    right, down = (max(-1.0, min(1.0, part)) for part in parts)
+    return Drive(MoveOver(right, down), aim)
+
+
+def plane(zoom: float, skill: Skill) -> tuple[float, float]:
+    """The tangents of the whole scale at a zoom: what was seen there, or a guess from what was seen elsewhere."""
+    if zoom in skill.planes or not skill.planes:
+        return skill.planes.get(zoom, (PLANE_TAN[0] / larger(zoom), PLANE_TAN[1] / larger(zoom)))
+    known = min(skill.planes, key=lambda other: abs(other - zoom))
+    pan, tilt = skill.planes[known]
+    return pan * larger(known) / larger(zoom), tilt * larger(known) / larger(zoom)
+
+
+def larger(zoom: float) -> float:
+    """How much the picture grows with zoom, about."""
+    return 1.0 + zoom / 4.0
+
+
+def seconds(pace: Pace, distance: float) -> float:
+    """How long the firmware needs for one axis, from rest to rest."""
+    rate, slow = pace.rate(1), 2 * pace.other(HALF_CHANGE)
+    if distance < slow * rate * rate:
+        return 2 * sqrt(distance * slow)
+    return distance / rate + slow * rate
+
+
+def longest(skill: Skill, here: Pose, there: Pose) -> float:
+    """How long the firmware needs for all axes."""
+    return max(seconds(pace, abs(b - a)) for pace, a, b in zip(skill.drives, here, there, strict=True))
+
+
+def learn_on_the_way(skill: Skill, here: Pose, drive: Drive, begun: Reply, reply: Reply, seen: Pose) -> None:
+    """A reading while it drives tells its speed, on the axes that do not slow down yet."""
+    usual = skill.timing.usual
+    for axis in (PAN, TILT):
+        pace, way = skill.drives[axis], drive.to[axis] - here[axis]
+        travel = (seen[axis] - here[axis]) * (1 if way > 0 else -1)
+        braking = pace.other(HALF_CHANGE) * pace.rate(1) ** 2
+        if LEAST_DEG < travel < abs(way) - 1.5 * braking - 3.0:
+            told = [Told(begun.received, begun.received - begun.sent - usual, 1)]
+            pace.learn(told, Seen(reply.sent, reply.received - reply.sent - usual, travel, 0.3))
+
+
+def judge(skill: Skill, here: Pose, drive: Drive, there: Pose) -> None:
+    """Where it led: whether the firmware honours this, and how far off it is."""
+    off = tuple(there[axis] - drive.to[axis] for axis in (PAN, TILT))
+    match drive.request:
+        case GotoPreset(number):
+            skill.presets[number] = (there[PAN] % 360.0, there[TILT], there[ZOOM])
+        case MoveTo(form=form):
+            before = skill.beside.get(form, (0.0, 0.0))
+            if abs(off[PAN]) > BESIDE_DEG or abs(off[TILT]) > BESIDE_DEG:
+                tilt_ignored = abs(off[PAN]) <= BESIDE_DEG and abs(there[TILT] - here[TILT]) < LEAST_DEG
+                skill.honours[form] = "pan" if tilt_ignored else "no"
+            else:
+                skill.honours[form] = "yes"
+                skill.beside[form] = (before[PAN] + off[PAN], before[TILT] + off[TILT])
+        case MoveOver():
+            _judge_over(skill, here, drive.request, there)
+
+
+def _judge_over(skill: Skill, here: Pose, request: MoveOver, there: Pose) -> None:
+    moved = [there[axis] - here[axis] for axis in (PAN, TILT)]
+    parts = (request.right, request.down)
+    asked = max(degrees(atan(abs(part))) for part in parts)
+    if asked > 1.0 and max(map(abs, moved)) < LEAST_DEG:
+        skill.honours[request.form] = "no"
+        return
+    skill.honours[request.form] = "yes"
+    old = list(plane(here[ZOOM], skill))
+    for axis, part in enumerate(parts):
+        if abs(moved[axis]) > 1.0 and moved[axis] * part * skill.senses[axis].sign > 0:
+            old[axis] = abs(tan(radians(moved[axis])) / part)
+    skill.planes[here[ZOOM]] = (old[PAN], old[TILT])
+
+
+def refuse(skill: Skill, drive: Drive) -> None:
+    """The firmware said no; a preset may be there another time."""
+    if isinstance(drive.request, MoveTo | MoveOver):
+        skill.honours[drive.request.form] = "no"
+
+
+def certain(skill: Skill, drive: Drive) -> bool:
+    """Whether it is known from experience where this leads."""
+    match drive.request:
+        case GotoPreset(number):
+            return number in skill.presets
+        case MoveTo(form=form):
+            return skill.honours.get(form) == "yes"
+    return False
+
+
+def honoured(skill: Skill, drive: Drive) -> bool:
+    """Whether this was tried before, and worked."""
+    if isinstance(drive.request, GotoPreset):
+        return drive.request.number in skill.presets
+    return skill.honours.get(drive.request.form) == "yes"
+
+
+def pan_only(skill: Skill) -> bool:
+    """Whether the firmware takes a position, but ignores its tilt."""
+    return "pan" in skill.honours.values() and "yes" not in skill.honours.values()
+
+
+def to_pan(here: Pose, to: Pose) -> Drive:
+    """To a pan and a zoom, on such firmware."""
+    return Drive(MoveTo(to[PAN] % 360.0, round(here[TILT], 1), to[ZOOM], "PositionABS"), to)

@@ -1,0 +1,81 @@
+"""A move that the firmware makes, followed until it rests. Which moves there are, and what they taught: `drive.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import cast
+
+from services.camera.device import same
+from services.camera.plan import Plan, wait
+from services.camera.ptz import drive as own
+from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.goal import Pose
+from services.camera.ptz.helm import Helm
+from services.camera.ptz.leg import NEAR_DEG
+from services.camera.ptz.pace import READ_LATE, READ_PART
+from services.camera.requests import Reading, Refused, Reply, Request, Status
+
+MOST_DRIVES = 4  # in one move
+LOOKS = 15
+LONGEST_DOUBT_S = 0.06
+
+
+class Driving:
+    """What the firmware does by itself in one move."""
+
+    def __init__(self, helm: Helm, presets: Mapping[int, Pose]) -> None:
+        self.helm, self.presets = helm, presets
+        self.drives = 0
+        self.tried: list[Request] = []
+
+    def drive(self, reading: Reading, now: float) -> Plan[tuple[Reading, float] | None]:
+        """Lets the firmware drive, where it has a way to; None when it has not."""
+        here = self.helm.pose(reading)
+        aim = (self.helm.aim[PAN], self.helm.aim[TILT], self.helm.goal.pose[ZOOM])
+        while self.helm.zoom_ends is None and self.drives < MOST_DRIVES:
+            way = own.find(here, aim, self.helm.limits, self.helm.skill, self.presets)
+            if way is None or way.request in self.tried or (self.drives and not own.honoured(self.helm.skill, way)):
+                break
+            self.drives += 1
+            self.tried.append(way.request)
+            try:
+                begun = yield from self.helm.send(way.request)
+            except Refused:
+                own.refuse(self.helm.skill, way)
+                continue
+            return (yield from self._arrive(way, here, begun))
+        return None
+
+    def _arrive(self, way: own.Drive, here: Pose, begun: Reply) -> Plan[tuple[Reading, float]]:
+        """Looks at the firmware's own move until it has ended; once on the way, where its speed is not known well."""
+        now = begun.received
+        arrives = now + own.longest(self.helm.skill, here, way.to)
+        known = all(one.known(1) for one in self.helm.skill.drives[:2])
+        if not known and arrives - now > 3 * self.helm.skill.timing.usual:
+            now = yield from wait(now + 0.6 * (arrives - now) - self.helm.skill.timing.usual)
+            reply = yield from self.helm.send(Status())
+            now, seen = reply.received, self.helm.limits.pose(cast(Reading, reply.result))
+            own.learn_on_the_way(self.helm.skill, here, way, begun, reply, seen)
+            arrives = begun.received + own.longest(self.helm.skill, here, way.to)
+        timing = self.helm.skill.paces[PAN]
+        late = timing.other_doubt(READ_LATE) + 0.5 * timing.other(READ_PART) * self.helm.skill.timing.spread
+        now = yield from wait(max(now, arrives - timing.other(READ_LATE) + min(LONGEST_DOUBT_S, late)))
+        before: Reading | None = None
+        for _ in range(LOOKS):
+            reply = yield from self.helm.send(Status())
+            reading = cast(Reading, reply.result)
+            if self._there(reading, way) or (before is not None and same(before, reading)):
+                break
+            before = reading
+        there = self.helm.limits.pose(reading)
+        own.judge(self.helm.skill, here, way, there)
+        self.helm.skill.zoomed = (reading.zoom, way.to[ZOOM]) if abs(reading.zoom - way.to[ZOOM]) <= 1.0 else None
+        self.helm.stand(reading)
+        return reading, reply.received
+
+    def _there(self, reading: Reading, way: own.Drive) -> bool:
+        """Whether it is where the firmware was to drive, as far as that is known exactly."""
+        if not own.certain(self.helm.skill, way):
+            return False
+        pose = self.helm.limits.pose(reading)
+        return all(abs(pose[axis] - way.to[axis]) <= NEAR_DEG for axis in (PAN, TILT))

@@ -1,0 +1,66 @@
+"""Moves to a place or to readings, as they are ordered: the goal, what helps on the way, and what is kept of them.
+
+Not here: how to get there (`move.py`), who has the motors (`motors.py`).
+"""
+
+from __future__ import annotations
+
+from services.camera.bulletin import Bulletin
+from services.camera.orders import GotoPlace, LookAt
+from services.camera.places import Places
+from services.camera.plan import Plan
+from services.camera.ptz.goal import Goal, Pose
+from services.camera.ptz.kept import Kept
+from services.camera.ptz.move import Arrival, goto
+from services.camera.ptz.skill import Skill
+from services.camera.requests import Identity, Picture
+from services.camera.settings import Config
+
+FRESH_S = 2.0  # a reading as old as this still tells where a camera at rest looks
+
+
+class Errands:
+    """The moves of one camera; `skill` is what they teach."""
+
+    def __init__(self, config: Config, bulletin: Bulletin, places: Places) -> None:
+        self.config, self.bulletin, self.places = config, bulletin, places
+        self.kept = Kept(config.state, config.name)
+        self.skill = Skill()
+        self.skill.forget_senses(flip=config.picture.flip, mirror=config.picture.mirror)
+
+    def meet(self, identity: Identity) -> None:
+        """It is known which camera this is."""
+        self.kept.recall(identity, self.skill)
+
+    def see(self, picture: Picture, old: Picture) -> None:
+        """The motors follow the picture: when its options changed, which way they turn is to be seen anew."""
+        if (picture.flip, picture.mirror) != (old.flip, old.mirror):
+            self.skill.forget_senses(flip=picture.flip, mirror=picture.mirror)
+
+    def goal(self, command: GotoPlace | LookAt) -> Goal:
+        """Where an order wants to look; what it leaves out stays as it is. Refused: nowhere that is."""
+        here = self.bulletin.known()
+        if isinstance(command, GotoPlace):
+            place = self.places.get(command.place)
+            return self.config.limits.goal(place.pan, place.tilt, place.zoom)
+        pan = here.pan if command.pan is None else command.pan
+        tilt = here.tilt if command.tilt is None else command.tilt
+        zoom = here.zoom if command.zoom is None else command.zoom
+        return self.config.limits.goal(pan, tilt, zoom)
+
+    def plan(self, command: GotoPlace | LookAt, now: float) -> Plan[Arrival]:
+        """The move; after it, it is known that the camera rests, and what was learnt is kept."""
+        near, until = self.bulletin.at_rest(now, FRESH_S), now + self.config.move_timeout_s
+        try:
+            arrival = yield from goto(
+                self.goal(command), self.config.limits, self.skill, until, near=near, presets=self._presets()
+            )
+        finally:
+            self.kept.save(self.skill)
+        self.bulletin.rests(arrival.reading, arrival.at)
+        return arrival
+
+    def _presets(self) -> dict[int, Pose]:
+        """Where the camera's presets look, as the places say."""
+        known = self.places.named.values()
+        return {one.preset: (one.pan, one.tilt, one.zoom) for one in known if one.preset is not None}

@@ -1,0 +1,172 @@
+"""At the helm of one move: sends, keeps the course, comes to rest. Not here: where to turn, how fast, and when."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from services.camera.device import same
+from services.camera.plan import Plan, ask, wait
+from services.camera.ptz.course import PAN, TILT, ZOOM, Course
+from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
+from services.camera.ptz.pace import READ_LATE, READ_PART
+from services.camera.ptz.skill import Skill
+from services.camera.ptz.stand import stop as until_confirmed
+from services.camera.requests import Direction, Reading, Reply, Request, Start, Status
+
+EDGES: Pose = (EDGE_DEG, EDGE_DEG, 0.3)  # how far from the ends of its range each axis stays
+COARSE_EDGE = 0.25  # of a step of zoom's reading, where that is coarse
+ODD_DEG = 0.4  # a reading farther from what was reckoned may not be of a camera at rest
+LATE_DOUBT_S = 0.06  # the age of readings is not known well: two equal ones, then
+LONGEST_DOUBT_S = 0.35
+EARLY = 0.4  # of what zoom has before it, at most, is given up for not knowing its rate
+FOREVER = 1e12
+WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
+SURPRISES = 0.2  # of what was known before is replaced by each rest
+DIRECTIONS = {direction.value: direction for direction in Direction}
+Levels = tuple[int, int, int]
+
+
+class Helm:
+    """One move. `commands` counts what was sent; `zoom_ends` is when to send what ends zoom, while it turns."""
+
+    def __init__(self, goal: Goal, limits: Limits, skill: Skill) -> None:
+        self.goal, self.limits, self.skill = goal, limits, skill
+        ends = zip(goal.pose, limits.ranges, EDGES, strict=True)
+        pan, tilt, zoom = (min(high - edge, max(low + edge, value)) for value, (low, high), edge in ends)
+        self.aim: Pose = (pan, tilt, zoom)
+        self.commands = 0
+        self.zoom_ends: float | None = None
+        self.quiet = 0.0  # until then the firmware drives by itself
+        self.course = Course(limits, skill, self.aim)
+
+    def pose(self, reading: Reading) -> Pose:
+        """A reading as a pose, with what is known better of zoom."""
+        pan, tilt, zoom = self.limits.pose(reading)
+        return pan, tilt, self.skill.zoom_truth(zoom)
+
+    def stand(self, reading: Reading) -> None:
+        """It was read at rest."""
+        self.skill.see_zoom(reading.zoom, self.limits.zoom)
+        self.course.stand(self.pose(reading))
+
+    def send(self, request: Request) -> Plan[Reply]:
+        """Sends, counts, and takes in how long it took."""
+        self.commands += 1
+        reply = yield from ask(request)
+        self.skill.timing.learn(reply.received - reply.sent)
+        return reply
+
+    def start(self, levels: Levels) -> Plan[Reply]:
+        """Begins a motion, in place of the one that runs."""
+        told = tuple(sign(level) * self.skill.senses[axis].sign for axis, level in enumerate(levels))
+        pan, tilt, zoom = map(abs, levels)
+        request = Start(DIRECTIONS[(told[0], told[1], told[2])], pan or tilt or zoom, tilt or None)
+        reply = yield from self.send(request)
+        self.course.tell(reply, levels)
+        if not levels[ZOOM]:
+            self.zoom_ends = None
+        return reply
+
+    def stop(self, now: float) -> Plan[float]:
+        """Ends all motion; returns when that was answered."""
+        self.commands += 1
+        reply = yield from until_confirmed(now)
+        self.skill.timing.learn(reply.received - reply.sent)
+        self.course.tell(reply, (0, 0, 0))
+        self.zoom_ends = None
+        return reply.received
+
+    def rest(self, now: float) -> Plan[tuple[Reading, float]]:
+        """The reading of pan and tilt at rest, and of zoom when it does not turn."""
+        usual = self.skill.timing.usual
+        pace, settled = self.skill.paces[PAN], self._settled()
+        if self.zoom_ends is not None and self.zoom_ends < max(now, settled) + usual + self.skill.timing.spread:
+            now = yield from self.stop((yield from wait(max(now, self.zoom_ends))))
+            settled = self._settled()
+        now = yield from wait(max(now, settled))
+        reply = yield from self.send(Status())
+        reading = cast(Reading, reply.result)
+        self._weigh(reading)
+        self.course.read(reply, reading)
+        while self.zoom_ends is None and (pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading)):
+            again = yield from self.send(Status())
+            before, reading, reply = reading, cast(Reading, again.result), again
+            if same(before, reading):
+                break
+        if self.zoom_ends is not None:
+            self.time_zoom(reply.received)
+        self._place_zoom(reading)
+        self.stand(reading)
+        return reading, reply.received
+
+    def _weigh(self, reading: Reading) -> None:
+        """How well the place of rest was reckoned, in seconds of the fastest motion before it."""
+        pose = self.limits.pose(reading)
+        for axis in (PAN, TILT):
+            told, pace = self.course.told[axis], self.skill.paces[axis]
+            fastest = max((pace.rate(abs(one.level)) for one in told if one.level), default=0.0)
+            if fastest > WEIGHED_DEG_S:
+                wrong = max(0.0, abs(pose[axis] - self.course.stopped(axis, FOREVER)) - NOISE_DEG) / fastest
+                self.skill.surprise += SURPRISES * (wrong - self.skill.surprise)
+
+    def reckoned(self, axis: int) -> float:
+        """How far off the reckoned place of rest of an axis may be, degrees."""
+        told, pace = self.course.told[axis], self.skill.paces[axis]
+        fastest = max((pace.rate(abs(one.level)) for one in told if one.level), default=0.0)
+        return 2 * self.skill.surprise * fastest
+
+    def _odd(self, reading: Reading) -> bool:
+        """Whether a reading at rest is not what was reckoned: it may not be at rest."""
+        pose = self.limits.pose(reading)
+        return any(
+            abs(pose[axis] - self.course.stopped(axis, FOREVER)) > ODD_DEG
+            for axis in (PAN, TILT)
+            if self.course.told[axis]
+        )
+
+    def _settled(self) -> float:
+        """When a reading has to be asked for that shows everything at rest."""
+        pace = self.skill.paces[PAN]
+        doubt = 2 * pace.other_doubt(READ_LATE) + pace.other(READ_PART) * self.skill.timing.spread
+        return max(self.quiet, self.course.rests_at()) - pace.other(READ_LATE) + min(LONGEST_DOUBT_S, doubt)
+
+    def _place_zoom(self, reading: Reading) -> None:
+        """Where zoom truly stands: what was reckoned, as far as its reading allows."""
+        if self.zoom_ends is None:
+            half = max(0.1, self.skill.zoom_grid / 2)
+            off = self.course.stopped(ZOOM, FOREVER) - reading.zoom
+            self.skill.zoomed = (reading.zoom, reading.zoom + (off if abs(off) <= half else sign(off) * half / 2))
+
+    def least(self, axis: int) -> float:
+        """The smallest step: a start, and its end as soon as it was answered."""
+        return self.skill.paces[axis].rate(1) * self.skill.timing.usual
+
+    def zoom_aim(self) -> float:
+        """Where zoom should end: a late end does no harm there, and its coarse reading is the goal's."""
+        low, high = self.limits.zoom
+        edge = self.zoom_edge()
+        return min(high - edge, max(low + edge, self.goal.pose[ZOOM]))
+
+    def zoom_edge(self) -> float:
+        """How far from an end of its range zoom stays."""
+        return max(EDGES[ZOOM], COARSE_EDGE * self.skill.zoom_grid)
+
+    def time_zoom(self, now: float) -> None:
+        """When zoom has to be ended: by what is known of its rate, earlier near an end while that is little."""
+        level, pace = self.course.levels[ZOOM], self.skill.paces[ZOOM]
+        low, high = self.limits.zoom
+        aim = self.zoom_aim()
+        ends = self.course.end_for(ZOOM, aim, now)
+        room = high - aim if level > 0 else aim - low
+        early = min(max(0.0, self.course.doubt(ZOOM, ends) - room) / pace.rate(1), EARLY * (ends - now))
+        self.zoom_ends = max(now, ends - early - self.skill.timing.usual)
+
+
+def levels_of(turning: dict[int, int]) -> Levels:
+    """The levels of all axes."""
+    return turning.get(PAN, 0), turning.get(TILT, 0), turning.get(ZOOM, 0)
+
+
+def sign(value: float) -> int:
+    """-1, 0 or 1."""
+    return (value > 0) - (value < 0)

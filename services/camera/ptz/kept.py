@@ -1,0 +1,129 @@
+"""What was learnt of a camera's motors, kept over a restart: a small file for each camera, by serial and firmware.
+
+Another camera under the same name, or another firmware, begins anew. A file that cannot be read is as none.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from services.camera.ptz.pace import Pace
+from services.camera.ptz.skill import KEEP, Honours, Sense, Skill
+from services.camera.requests import Identity
+
+Pair = tuple[float, float]
+Triple = tuple[float, float, float]
+log = logging.getLogger(__name__)
+
+
+class _Pace(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    mean: list[float]
+    cov: list[list[float]]
+
+
+class _Kept(BaseModel):
+    """The file."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    serial: str
+    firmware: str
+    paces: tuple[_Pace, _Pace, _Pace]
+    drives: tuple[_Pace, _Pace, _Pace]
+    picture: tuple[bool, bool]
+    senses: tuple[tuple[int, bool], tuple[int, bool]]
+    took: list[float]
+    count: int
+    worst: float
+    diagonals: bool
+    zoom_steps: list[float]
+    honours: dict[str, Honours]
+    beside: dict[str, Pair]
+    presets: dict[int, Triple]
+    planes: dict[float, Pair]
+
+
+class Kept:
+    """One camera's file; without a folder nothing is kept."""
+
+    def __init__(self, folder: Path | None, camera: str) -> None:
+        self.file = folder / "cameras" / f"{camera}.json" if folder else None
+        self.identity: Identity | None = None
+
+    def recall(self, identity: Identity, skill: Skill) -> None:
+        """It is known which camera this is: takes in what was kept of that one."""
+        if self.identity == identity:
+            return
+        self.identity = identity
+        kept = self._read()
+        if kept is not None and (kept.serial, kept.firmware) == (identity.serial, identity.version):
+            _take_in(kept, skill)
+            log.info("what was learnt of the motors of %s is known again", identity.serial)
+
+    def save(self, skill: Skill) -> None:
+        """Writes it, at once as a whole."""
+        if self.file is None or self.identity is None:
+            return
+        text = _kept(self.identity, skill).model_dump_json()
+        try:
+            self.file.parent.mkdir(parents=True, exist_ok=True)
+            fresh = self.file.with_suffix(".new")
+            fresh.write_text(text, encoding="utf-8")
+            os.replace(fresh, self.file)
+        except OSError as error:
+            log.warning("what was learnt of the motors is not kept: %s", error)
+
+    def _read(self) -> _Kept | None:
+        if self.file is None or not self.file.exists():
+            return None
+        try:
+            return _Kept.model_validate_json(self.file.read_text(encoding="utf-8"))
+        except (OSError, ValidationError, UnicodeDecodeError) as error:
+            log.warning("%s cannot be read, the motors are learnt anew: %s", self.file, str(error)[:200])
+            return None
+
+
+def _kept(identity: Identity, skill: Skill) -> _Kept:
+    return _Kept(
+        serial=identity.serial,
+        firmware=identity.version,
+        paces=_paces(skill.paces),
+        drives=_paces(skill.drives),
+        picture=skill.picture,
+        senses=((skill.senses[0].sign, skill.senses[0].sure), (skill.senses[1].sign, skill.senses[1].sure)),
+        took=list(skill.timing.took),
+        count=skill.timing.count,
+        worst=skill.timing.worst,
+        diagonals=skill.diagonals,
+        zoom_steps=skill.zoom_steps,
+        honours=skill.honours,
+        beside=skill.beside,
+        presets=skill.presets,
+        planes=skill.planes,
+    )
+
+
+def _paces(paces: tuple[Pace, Pace, Pace]) -> tuple[_Pace, _Pace, _Pace]:
+    pan, tilt, zoom = (_Pace(mean=one.mean.round(9).tolist(), cov=one.cov.round(12).tolist()) for one in paces)
+    return pan, tilt, zoom
+
+
+def _take_in(kept: _Kept, skill: Skill) -> None:
+    for own, known in zip((*skill.paces, *skill.drives), (*kept.paces, *kept.drives), strict=True):
+        mean, cov = np.array(known.mean, float), np.array(known.cov, float)
+        if mean.shape == own.mean.shape and cov.shape == own.cov.shape:
+            own.mean, own.cov = mean, cov
+    if kept.picture == skill.picture:
+        skill.senses = (Sense(*kept.senses[0]), Sense(*kept.senses[1]), skill.senses[2])
+    skill.timing.took = deque(kept.took[:-1], maxlen=KEEP)
+    if kept.took:
+        skill.timing.learn(kept.took[-1])
+    skill.timing.count, skill.timing.worst = kept.count, kept.worst
+    skill.diagonals, skill.zoom_steps, skill.honours = kept.diagonals, kept.zoom_steps, kept.honours
+    skill.beside, skill.presets, skill.planes = kept.beside, kept.presets, kept.planes

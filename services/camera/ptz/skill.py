@@ -1,0 +1,104 @@
+"""All that is learnt about one camera's motors: its axes, which way is which, how long answers take, what it honours.
+
+Not here: how an axis learns (`pace.py`), where this is kept over a restart (`kept.py`).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from statistics import median
+from typing import Literal
+
+from services.camera.ptz.pace import PAN_RATES, TILT_RATES, ZOOM_RATES, Pace
+
+Honours = Literal["unknown", "no", "pan", "yes"]  # of a way to let the firmware drive; pan: it ignores tilt
+DRIVES = (45.0, 27.0, 4.0)  # degrees/s, levels/s: the firmware's own moves, a guess to begin with
+KEEP = 120  # answers, for how long they take
+LATENCY_S, SPREAD_S = 0.3, 0.1  # of an answer, before any was measured
+TAIL_S = 1.0  # an answer may come so much later than usual, until experience says otherwise
+EXPERIENCE = 150  # answers without a late one that make a tail half as likely
+FORGETS, WORSE = 0.998, 1.2  # of the latest answer: kept with each one more; and it may be later the next time
+GRIDS = (2.0, 1.0)  # some firmware tells zoom in coarse steps
+
+
+@dataclass
+class Sense:
+    """Which way the reading goes when the camera is told right, down or in: +1 or -1; `sure` once it was seen."""
+
+    sign: int = 1
+    sure: bool = False
+
+
+@dataclass
+class Timing:
+    """How long answers take."""
+
+    took: deque[float] = field(default_factory=lambda: deque(maxlen=KEEP))
+    count: int = 0
+    usual: float = LATENCY_S
+    spread: float = SPREAD_S
+    worst: float = 0.0  # how much later than usual one came; forgotten slowly
+
+    def learn(self, seconds: float) -> None:
+        """Takes in one answer."""
+        self.count += 1
+        self.worst = max(FORGETS * self.worst, seconds - self.usual)
+        self.took.append(seconds)
+        ordered = sorted(self.took)
+        if len(ordered) >= 3:
+            self.usual = median(ordered)
+        if len(ordered) >= 8:
+            low, high = ordered[len(ordered) // 10], ordered[len(ordered) - 1 - len(ordered) // 10]
+            self.spread = max(0.01, 0.6 * (high - low))
+
+    @property
+    def tail(self) -> float:
+        """How much later than usual an answer may come: what happened, and some doubt while little has."""
+        return max(TAIL_S / (1 + self.count / EXPERIENCE), WORSE * self.worst, self.spread)
+
+
+@dataclass
+class Skill:
+    """What is learnt about one camera. `zoomed` is where zoom truly is, as far as its coarse reading leaves open."""
+
+    paces: tuple[Pace, Pace, Pace] = field(
+        default_factory=lambda: (Pace(PAN_RATES), Pace(TILT_RATES), Pace(ZOOM_RATES))
+    )
+    senses: tuple[Sense, Sense, Sense] = field(default_factory=lambda: (Sense(), Sense(), Sense(sure=True)))
+    timing: Timing = field(default_factory=Timing)
+    picture: tuple[bool, bool] = (False, False)  # flip and mirror, with which the senses were seen
+    surprise: float = 0.1  # s: how far off a place of rest is reckoned, over the speed before it
+    diagonals: bool = True
+    zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
+    zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
+    drives: tuple[Pace, Pace, Pace] = field(default_factory=lambda: tuple(Pace((top,)) for top in DRIVES))  # type: ignore[assignment]
+    honours: dict[str, Honours] = field(default_factory=dict)  # by form
+    beside: dict[str, tuple[float, float]] = field(default_factory=dict)  # by form: pan and tilt off what was asked
+    presets: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # readings where each was seen to be
+    planes: dict[float, tuple[float, float]] = field(default_factory=dict)  # by zoom: tangents of the whole scale
+
+    def forget_senses(self, *, flip: bool, mirror: bool) -> None:
+        """The picture's options changed, and these swap the motors: guess, and look at the next motion."""
+        self.picture = (flip, mirror)
+        self.senses[0].sign, self.senses[0].sure = (1 if mirror else -1), False
+        self.senses[1].sign, self.senses[1].sure = (1 if flip else -1), False
+
+    def see_zoom(self, reading: float, ends: tuple[float, float]) -> None:
+        """Takes in a reading of zoom: whether they come in steps shows between the ends."""
+        if reading not in ends and reading not in self.zoom_steps:
+            self.zoom_steps = [*self.zoom_steps[-7:], reading]
+
+    @property
+    def zoom_grid(self) -> float:
+        """The step in which zoom is told; 0: fine, or not known yet."""
+        if not self.zoom_steps:
+            return 0.0
+        fits = (grid for grid in GRIDS if all(abs(one / grid - round(one / grid)) < 0.01 for one in self.zoom_steps))
+        return next(fits, 0.0)
+
+    def zoom_truth(self, reading: float) -> float:
+        """Where zoom is: the reading, or what is known better since it only tells steps."""
+        if self.zoomed is not None and self.zoomed[0] == reading:
+            return self.zoomed[1]
+        return reading

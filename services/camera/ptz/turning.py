@@ -1,0 +1,197 @@
+"""Legs of pan and tilt: both axes at once, watched where that helps, ended when the reckoning says so.
+
+Which speeds a leg has is chosen in `leg.py`; what is done after it, in `move.py`.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+from services.camera.plan import Plan, wait
+from services.camera.ptz import drive as own
+from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.helm import Helm, levels_of, sign
+from services.camera.ptz.leg import GOOD_DEG, NEAR_DEG, Leg, Way, choose
+from services.camera.ptz.zooming import Zooming
+from services.camera.requests import Reading, Refused, Status
+
+RUNGS = 6  # legs without a rest between them
+RECKONED_DEG = 0.3
+FEW_COMMANDS = 3  # after so many, accuracy goes before time
+DEARER = 0.5  # each command more makes a correction so much dearer
+MANY_COMMANDS = 7  # after so many, a look has to be worth more
+ENOUGH_DEG = 0.2  # doubt about the place of an end that needs no look
+PROBE_DEG_S = 9.0
+PROBE_S = 0.35  # seen in the readings, and harmless the wrong way
+MOVED_DEG = 0.3
+LOOKS = 3  # readings in a leg
+
+
+class Turning:
+    """What pan and tilt do in one move."""
+
+    def __init__(self, helm: Helm, zooming: Zooming) -> None:
+        self.helm, self.zooming = helm, zooming
+
+    def turn(self, axes: list[int], now: float, *, zoom: bool) -> Plan[float]:
+        """One leg of pan and tilt; it ends with a stop, or with zoom in its place. Returns when that was answered."""
+        unsure = [axis for axis in axes if not self.helm.skill.senses[axis].sure]
+        if self.helm.zoom_ends is not None:
+            now = yield from wait(self.helm.zoom_ends)
+        try:
+            if unsure:
+                now = yield from self._probe(unsure)
+            elif axes == [PAN] and own.pan_only(self.helm.skill):
+                return (yield from self._home_pan(now))
+            return (yield from self._legs(axes, now, zoom=zoom))
+        except Refused:
+            if not self.helm.skill.diagonals or len(axes) < 2:
+                raise
+            self.helm.skill.diagonals = False
+            return (yield from self.turn(axes, now, zoom=zoom))
+
+    def _legs(self, axes: list[int], now: float, *, zoom: bool) -> Plan[float]:
+        """Legs without a reading between them, as long as it is known well enough where each one ends."""
+        for _ in range(RUNGS):
+            now = yield from self._swing(axes, now)
+            leg, turning = self._choose(axes, now)
+            now = (yield from self.helm.start(levels_of(turning))).received
+            now = yield from self._see_through(leg, turning, now)
+            others = [axis for axis in axes if axis not in leg.parts]
+            axes = others or self._goes_on(leg, now)
+            if axes:
+                continue
+            if own.pan_only(self.helm.skill) and (zoom or PAN in leg.parts):
+                return (yield from self._home_pan(now))
+            now = yield from (self.zooming.begin() if zoom else self.helm.stop(now))
+            zoom, axes = False, self._reckon(now)
+            if not axes:
+                return now
+            if self.helm.zoom_ends is not None:
+                now = yield from wait(max(now, self.helm.zoom_ends))
+        return (yield from self.helm.stop(now))
+
+    def _home_pan(self, now: float) -> Plan[float]:
+        """Firmware that takes a position but ignores its tilt ends a leg: pan and zoom become exact, tilt ends."""
+        helm = self.helm
+        here = tuple(helm.course.stopped(axis, now) for axis in range(3))
+        way = own.to_pan((here[0], here[1], here[2]), (helm.aim[PAN], here[TILT], helm.goal.pose[ZOOM]))
+        now = (yield from helm.send(way.request)).received
+        helm.course.leave(here[ZOOM])
+        helm.quiet = now + own.longest(helm.skill, (here[0], here[1], here[2]), way.to)
+        return now
+
+    def _reckon(self, now: float) -> list[int]:
+        """The axes that will rest beside the goal, where that is reckoned well enough to go on without a reading."""
+        turned = [axis for axis in (PAN, TILT) if self.helm.course.told[axis]]
+        if any(self.helm.reckoned(axis) > RECKONED_DEG for axis in turned):
+            return []
+        off = {axis: abs(self.helm.aim[axis] - self.helm.course.stopped(axis, now)) for axis in turned}
+        return [axis for axis, distance in off.items() if distance > GOOD_DEG]
+
+    def _see_through(self, leg: Leg, turning: dict[int, int], now: float) -> Plan[float]:
+        """From the start of a leg to the time for its end; an axis that ends before the other is ended."""
+        while not leg.joint and len(turning) > 1:
+            now = yield from self._watch(leg, turning, now)
+            del turning[min(turning, key=lambda axis: self._end(leg, axis, now))]
+            now = (yield from self.helm.start(levels_of(turning))).received
+        return (yield from self._watch(leg, turning, now))
+
+    def _goes_on(self, leg: Leg, now: float) -> list[int]:
+        """The axes that need another leg at once: it ended early for fear of a stop, and is known well enough."""
+        timing, ahead = self.helm.skill.timing, {}
+        for axis, part in leg.parts.items():
+            ends = now + timing.usual
+            spread = self.helm.skill.paces[axis].rate(part.speed) * timing.spread + self.helm.course.doubt(axis, ends)
+            left = abs(self.helm.aim[axis] - self.helm.course.stopped(axis, ends))
+            if left > NEAR_DEG:
+                ahead[axis] = left > spread + NEAR_DEG
+        return list(ahead) if leg.feared and ahead and all(ahead.values()) else []
+
+    def _swing(self, axes: list[int], now: float) -> Plan[float]:
+        """Where even the smallest step is too long, it begins the other way; the leg then turns it round."""
+        levels = [0, 0, 0]
+        for axis in axes if self.helm.skill.diagonals else axes[:1]:
+            distance, least = self.helm.aim[axis] - self.helm.course.stopped(axis, now), self.helm.least(axis)
+            if least - abs(distance) > NEAR_DEG:
+                levels[axis] = -sign(distance)
+        if any(levels):
+            return (yield from self.helm.start((levels[0], levels[1], levels[2]))).received
+        return now
+
+    def _choose(self, axes: list[int], now: float) -> tuple[Leg, dict[int, int]]:
+        """The next leg and its levels, from where it stands, or from where it will be when the start takes effect."""
+        ways = {}
+        for axis in axes:
+            distance = self.helm.aim[axis] - self.helm.course.stopped(axis, now + self.helm.skill.timing.usual)
+            low, high = self.helm.limits.ranges[axis]
+            room = high - self.helm.aim[axis] if distance > 0 else self.helm.aim[axis] - low
+            ways[axis] = Way(distance, room, self.helm.skill.paces[axis])
+        leg = choose(ways, self.helm.skill, hurry=1.0 + DEARER * max(0, self.helm.commands - FEW_COMMANDS))
+        return leg, {axis: part.speed * (sign(ways[axis].distance) or 1) for axis, part in leg.parts.items()}
+
+    def _end(self, leg: Leg, axis: int, now: float) -> float:
+        """When the end of an axis has to take effect."""
+        goal = self.helm.aim[axis] + leg.parts[axis].off * sign(self.helm.course.levels[axis])
+        return self.helm.course.end_for(axis, goal, now)
+
+    def _watch(self, leg: Leg, left: dict[int, int], now: float) -> Plan[float]:
+        """Waits until the next end has to be sent; reads on the way where that makes the end more certain."""
+        usual, spread = self.helm.skill.timing.usual, self.helm.skill.timing.spread
+        for look in range(LOOKS + 1):
+            ends = {axis: self._end(leg, axis, now) for axis in left}
+            rates = {axis: self.helm.skill.paces[axis].rate(leg.parts[axis].speed) for axis in left}
+            if leg.joint:
+                together = sum(ends[axis] * rates[axis] for axis in left) / sum(rates.values())
+                send = min([together, *(ends[axis] for axis in left if leg.parts[axis].feared)]) - usual
+            else:
+                send = min(ends.values()) - usual
+            if look == LOOKS or send - now < usual + spread:
+                break
+            enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else NEAR_DEG
+            if all(self.helm.course.doubt(axis, ends[axis]) < max(0.4 * spread * rates[axis], enough) for axis in left):
+                break
+            latest = send - usual - spread
+            sure = all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)
+            now = yield from wait(latest if sure else min(latest, now + max(0.3, 0.5 * (latest - now))))
+            reply = yield from self.helm.send(Status())
+            now = reply.received
+            self.helm.course.read(reply, cast(Reading, reply.result))
+        return (yield from wait(max(now, send)))
+
+    def _probe(self, axes: list[int]) -> Plan[float]:
+        """Turns slowly to see which way that is; it goes on turning."""
+        levels = [0, 0, 0]
+        for axis in axes if self.helm.skill.diagonals else axes[:1]:
+            here = self.helm.course.origin[axis]
+            low, high = self.helm.limits.ranges[axis]
+            most = min(PROBE_DEG_S, min(high - here, here - low))
+            pace = self.helm.skill.paces[axis]
+            speed = max((speed for speed in pace.speeds if pace.guess[speed - 1] <= most), default=1)
+            levels[axis] = speed * (1 if self.helm.aim[axis] > here else -1)
+        now = (yield from self.helm.start((levels[0], levels[1], levels[2]))).received
+        for _ in range(LOOKS):
+            now = yield from wait(now + PROBE_S)
+            reply = yield from self.helm.send(Status())
+            now, reading = reply.received, cast(Reading, reply.result)
+            if self._see_senses(reading, levels):
+                break
+        self.helm.course.read(reply, reading)
+        return now
+
+    def _see_senses(self, reading: Reading, levels: list[int]) -> bool:
+        """Whether every axis that was probed has shown which way it goes."""
+        pose, seen = self.helm.limits.pose(reading), True
+        for axis in (PAN, TILT):
+            moved = pose[axis] - self.helm.course.origin[axis]
+            sense = self.helm.skill.senses[axis]
+            if not levels[axis] or sense.sure:
+                continue
+            if abs(moved) < MOVED_DEG:
+                seen = False
+                continue
+            sense.sure = True
+            if moved * self.helm.course.levels[axis] < 0:
+                sense.sign = -sense.sign
+                self.helm.course.flip(axis)
+        return seen

@@ -1,0 +1,53 @@
+"""Zoom in a move: its start takes the place of what pan and tilt do, and their next start, or a stop, ends it.
+
+It has one speed and its readings are coarse, so its place is reckoned by time. Not here: when its turn is (`move.py`).
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+from services.camera.plan import Plan, wait
+from services.camera.ptz.course import ZOOM
+from services.camera.ptz.helm import Helm, sign
+from services.camera.requests import Reading, Status
+
+NEAR_LEVELS = 0.5
+LOOKS = 3  # readings while it turns
+
+
+class Zooming:
+    """What zoom does in one move."""
+
+    def __init__(self, helm: Helm) -> None:
+        self.helm = helm
+
+    def _way(self) -> float:
+        """How far zoom has to go, with its sign."""
+        return self.helm.zoom_aim() - self.helm.course.at(ZOOM, 0.0)
+
+    def begin(self) -> Plan[float]:
+        """Starts zoom; it goes on. A way that is shorter than the smallest step begins the other way."""
+        way = self._way()
+        level = sign(way) or 1
+        if abs(way) < self.helm.least(ZOOM) - self.helm.zoom_edge():
+            yield from self.helm.start((0, 0, -level))
+        now = (yield from self.helm.start((0, 0, level))).received
+        self.helm.time_zoom(now)
+        return now
+
+    def see_through(self, now: float) -> Plan[float]:
+        """Zoom alone turns: looks at it while that tells when to end it, and ends it."""
+        timing = self.helm.skill.timing
+        for _ in range(LOOKS):
+            assert self.helm.zoom_ends is not None
+            sure = self.helm.course.doubt(ZOOM, self.helm.zoom_ends + timing.usual) < NEAR_LEVELS
+            if sure or self.helm.zoom_ends - now < timing.usual + timing.spread:
+                break
+            now = yield from wait(now + max(0.0, 0.4 * (self.helm.zoom_ends - now - timing.usual)))
+            reply = yield from self.helm.send(Status())
+            now = reply.received
+            self.helm.course.read(reply, cast(Reading, reply.result))
+            self.helm.time_zoom(now)
+        assert self.helm.zoom_ends is not None
+        return (yield from self.helm.stop((yield from wait(max(now, self.helm.zoom_ends)))))

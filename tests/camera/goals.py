@@ -1,0 +1,193 @@
+"""Random goals for the regulator against the inside of the simulated camera, in virtual time, in the wire's own words.
+
+The plan is driven as the service's stage drives it; requests go through the brand's client, login and all. Truth is
+taken from the simulator, which the plan never sees. Used by the test over all profiles, the soak and the bench.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, cast
+from unittest.mock import Mock
+
+from pydantic import SecretStr
+
+from services.camera.address import Address
+from services.camera.brands.amcrest import Amcrest
+from services.camera.plan import Plan, Run, Stage
+from services.camera.ptz.goal import Limits
+from services.camera.ptz.move import Arrival, goto
+from services.camera.ptz.skill import Skill
+from services.camera.requests import Reading, Reply, Request, Status
+from services.errors import DeviceError
+from services.simulators.camera.device import Device
+from services.simulators.camera.digest import Door, realm
+from services.simulators.camera.firmwares import PROFILES
+from services.simulators.camera.latency import Latency
+from services.simulators.camera.profiles import Profile
+from services.simulators.camera.program import Inside
+from services.simulators.world import load
+from services.virtual.wire import Wire
+from tests.camera.least_time import Constants, least_time
+
+WORLD = Path(__file__).parents[2] / "config" / "world.yaml"
+LIMITS = Limits()
+START = 1_768_000_000.0
+LEVELS = (0.0, 2.0, 4.0, 6.0, 8.0)
+
+Goal = tuple[float, float, float]
+
+
+def random_goals(count: int, seed: int) -> list[Goal]:
+    """Goals in pan, tilt and zoom, on both sides of the dead arc."""
+    rng = random.Random(seed)
+    return [
+        (
+            round(rng.choice((rng.uniform(0.0, 178.5), rng.uniform(186.5, 359.9))), 1),
+            round(rng.uniform(-9.5, 107.5), 1),
+            rng.choice(LEVELS),
+        )
+        for _ in range(count)
+    ]
+
+
+@dataclass
+class Outcome:
+    """How one goal went."""
+
+    goal: Goal
+    seconds: float
+    least: float
+    commands: int  # requests without those that a challenge answered
+    requests: int
+    off: float  # degrees, the truth
+    off_zoom: float
+    rests: bool
+    pushed: float
+    error: str | None = None
+
+    @property
+    def ratio(self) -> float:
+        """Time over the least time."""
+        return self.seconds / self.least
+
+
+@dataclass
+class Rig:
+    """One simulated camera, the brand's client, and what the regulator has learnt so far."""
+
+    profile: Profile
+    seed: int = 1
+    skill: Skill = field(default_factory=Skill)
+    now: float = START
+    near: Reading | None = None
+    log: Callable[[Reply], None] = lambda reply: None
+
+    def __post_init__(self) -> None:
+        world = load(WORLD)
+        self.camera = world.cameras["ip1"]
+        rng = random.Random(self.seed)
+        self.device = Device(self.camera, self.profile, self.now, Latency(self.profile, None, rng))
+        door = Door(realm(self.profile, self.camera.serial), "ros", "secret123", self.profile, rng)
+        self.wire = Counted(Inside(self.device, door, Mock()))
+        address = Address("http://192.0.2.9", "ros", SecretStr("secret123"))
+        self.client = Amcrest(address, self.wire)
+        self.skill.forget_senses(flip=True, mirror=True)
+        self.near = cast(Reading, self._send(Status(), 0).result)  # as the service polls it
+
+    def go(self, goal: Goal, **more: Any) -> Outcome:
+        """One goal."""
+        here, pushed = self.truth(), self.pushed()
+        self.wire.commands = self.wire.requests = 0
+        began = self.now
+        run = self.drive(goto(LIMITS.goal(*goal), LIMITS, self.skill, self.now + 60.0, near=self.near, **more))
+        there = self.truth()
+        self.near = run.result.reading if isinstance(run.result, Arrival) else None
+        return Outcome(
+            goal=goal,
+            seconds=self.now - began,
+            least=least_time(here, goal, constants(self.profile)),
+            commands=self.wire.commands,
+            requests=self.wire.requests,
+            off=max(abs(LIMITS.unwrap(there[0]) - LIMITS.unwrap(goal[0])), abs(there[1] - goal[1])),
+            off_zoom=abs(there[2] - goal[2]),
+            rests=not any(self.device.motion(self.now)[1]),
+            pushed=self.pushed() - pushed,
+            error=str(run.error) if run.error else None,
+        )
+
+    def truth(self) -> Goal:
+        """Where the motors are."""
+        pose = self.device.motion(self.now)[0]
+        return pose.pan, pose.tilt, pose.zoom
+
+    def pushed(self) -> float:
+        """For how long pan and tilt were pushed against their ends, seconds; a digital zoom has none."""
+        return sum(self.device.ptz.motors.worked(self.now).pushed_s[:2])
+
+    def drive(self, plan: Plan[Any]) -> Run:
+        """Runs a plan to its end."""
+        waiting: list[tuple[Request, int]] = []
+        stage = Stage(lambda request, ticket: waiting.append((request, ticket)))
+        run = stage.begin(plan, self.now, lambda run, now: None)
+        end = self.now + 300.0
+        while not run.done:
+            assert self.now < end, "the plan does not end"
+            if waiting:
+                reply = self._send(*waiting.pop(0))
+                self.log(reply)
+                stage.reply(reply, self.now)
+            else:
+                assert stage.due is not None
+                self.now = max(self.now, stage.due)
+                stage.tick(self.now)
+        return run
+
+    def _send(self, request: Request, ticket: int) -> Reply:
+        sent = self.wire.now = self.now
+        result: object = None
+        fault: DeviceError | None = None
+        try:
+            result = self.client.send(request)
+        except DeviceError as error:
+            fault = error
+        self.now = self.wire.now
+        return Reply(request, ticket, result, fault, sent, self.now)
+
+
+class Counted(Wire):
+    """The wire, with a count."""
+
+    commands = requests = 0
+
+    def handle_request(self, request: Any) -> Any:
+        answer = super().handle_request(request)
+        self.requests += 1
+        self.commands += answer.status_code != 401
+        return answer
+
+
+def constants(profile: Profile) -> Constants:
+    """The motors' constants of a simulated camera."""
+    top = max(profile.pan_speeds)
+    return Constants(
+        (top, top * profile.tilt_share, profile.zoom_speed),
+        (profile.pan_acceleration, profile.tilt_acceleration, profile.zoom_acceleration),
+    )
+
+
+def outcomes(profile: Profile, goals: Iterable[Goal], seed: int = 1) -> list[Outcome]:
+    """All goals one after the other, from a cold start; some time passes between two."""
+    rig, found = Rig(profile, seed), []
+    for goal in goals:
+        found.append(rig.go(goal))
+        rig.now += 1.0
+    return found
+
+
+def named() -> dict[str, Profile]:
+    """Every profile that the simulator has."""
+    return {name: replace(profile) for name, profile in PROFILES.items()}
