@@ -73,6 +73,11 @@ class Channel:
         return self.on and bool(self.reader.flow.name) and not self._still(self.clock())
 
     @property
+    def timed(self) -> bool:
+        """Whether it is known of each picture that flows when it was exposed."""
+        return self.flows and self.reader.flow.name == "rtsp"
+
+    @property
     def hopeful(self) -> bool:
         """Whether moving pictures may still come by themselves."""
         return self.reader.on and self.reader.flow.failures == 0 and not self._still(self.clock())
