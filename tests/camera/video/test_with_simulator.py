@@ -98,3 +98,20 @@ def test_half_a_picture_is_none(camera: simulated.Simulated) -> None:
     assert pictures.decode(whole + b"\0" * 100).shape == (1296, 2304, 3)
     with pytest.raises(pictures.Away):
         pictures.decode(whole[: len(whole) // 2])
+
+
+def test_a_new_password_costs_three_failed_logins_at_most_with_the_stream_too(
+    tmp_path: Path, camera: simulated.Simulated
+) -> None:
+    with seeing(tmp_path, camera, login_retry_s=6.0) as here:
+        switch_on(here)
+        before = here.truth()["door"]["wrong"]
+        here.tell("fault", name="password")
+        here.tell("drop")
+        here.until(lambda: status(here) == "bad_login", 15)
+        until = time.monotonic() + 3
+        here.until(lambda: time.monotonic() > until, 10)
+        assert 1 <= here.truth()["door"]["wrong"] - before <= 3
+        here.tell("well")
+        here.until(lambda: status(here) == "online", 60)
+        here.until(lambda: diagnostic(here)["values"]["stream"] == "rtsp", 60)
