@@ -74,6 +74,8 @@ def start(config: Config, *, clock: Callable[[], float] = time.time) -> Iterator
         if live is not None:
             server.device.tables.fix("RTSP.Port", str(live.port))
         rtsp_port = live.port if live else None
+        if server.onvif is not None:
+            server.onvif.rtsp_port = rtsp_port
         yield Simulated(f"http://{config.host}:{port}", port, side.server_address[1], rtsp_port, server)
 
 
