@@ -41,6 +41,8 @@ class _Kept(BaseModel):
     took: list[float]
     count: int
     worst: float
+    surprise: float
+    arrives_late: float
     diagonals: bool
     zoom_steps: list[float]
     honours: dict[str, Honours]
@@ -100,6 +102,8 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
         took=list(skill.timing.took),
         count=skill.timing.count,
         worst=skill.timing.worst,
+        surprise=skill.surprise,
+        arrives_late=skill.arrives_late,
         diagonals=skill.diagonals,
         zoom_steps=skill.zoom_steps,
         honours=skill.honours,
@@ -125,5 +129,6 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
     if kept.took:
         skill.timing.learn(kept.took[-1])
     skill.timing.count, skill.timing.worst = kept.count, kept.worst
+    skill.surprise, skill.arrives_late = kept.surprise, kept.arrives_late
     skill.diagonals, skill.zoom_steps, skill.honours = kept.diagonals, kept.zoom_steps, kept.honours
     skill.beside, skill.presets, skill.planes = kept.beside, kept.presets, kept.planes
