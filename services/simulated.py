@@ -80,6 +80,7 @@ def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
     parts = Parts(folder)
     parts.environment["APARTMENT_STATE"] = str(folder / "state")
     parts.environment["APARTMENT_CAMERA_PORT"] = str(free_port())
+    parts.environment["APARTMENT_CAMERA_RTSP_PORT"] = str(free_port())
     parts.environment["APARTMENT_SIDE_DOOR_PORT"] = str(free_port())
     with ExitStack() as stack:
         for start in (_start_broker, _start_database, _start_ros):

@@ -65,6 +65,7 @@ class SmallFlat:
     broker: mosquitto.Broker
     process: subprocess.Popen[bytes]
     doors: dict[str, Door]
+    urls: dict[str, str]
     ros: ros.Master | None = None
     networks: dict[str, Network] = field(default_factory=dict)
     _broker: ExitStack = field(default_factory=ExitStack)
@@ -110,6 +111,13 @@ class SmallFlat:
         with self.client("camera/+/status") as client:
             for name in self.doors:
                 client.payload(f"camera/{name}/status", lambda status: status.state == "online", READY_S)
+
+    def table(self, camera: str, name: str) -> dict[str, str]:
+        """A table of the camera's configuration, asked for as any client would."""
+        auth = httpx.DigestAuth("ros", PASSWORD)
+        target = f"{self.urls[camera]}/cgi-bin/configManager.cgi?action=getConfig&name={name}"
+        lines = httpx.get(target, auth=auth).raise_for_status().text.splitlines()
+        return dict(line.removeprefix("table.").split("=", 1) for line in lines if "=" in line)
 
     @contextmanager
     def client(self, *filters: str) -> Iterator[Client]:
@@ -177,7 +185,8 @@ def small_flat(
         names = [f"simulated-camera-{name}" for name in doors]
         simulators = stack.enter_context(_running(config, folder / "simulators.log", names))
         stack.enter_context(services)
-        flat = SmallFlat(folder, config, broker, simulators, doors, master, networks, broker_stack, services)
+        urls = {name: f"http://127.0.0.1:{port}" for name, port in ports.items()}
+        flat = SmallFlat(folder, config, broker, simulators, doors, urls, master, networks, broker_stack, services)
         flat.start_services()
         yield flat
 

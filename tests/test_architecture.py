@@ -91,6 +91,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.simulators.camera.",
     ),
     "av": ("services.camera.video.rtsp",),
+    "gi": ("services.simulators.camera.rtsp.",),
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),

@@ -9,7 +9,7 @@ import logging
 from dataclasses import dataclass
 from typing import Literal
 
-from services.camera.requests import Away, BadLogin, Locked, Reply
+from services.camera.requests import Away, BadLogin, Locked, Reply, Status
 from services.payloads import CameraStatus
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0  # between attempts to reach a camera that is away
@@ -31,6 +31,7 @@ class Health:
     latency: float = 0.0
     failures: int = 0
     rebooting: bool = False
+    stream: str = ""  # why no moving picture comes although it was ordered
     moving: bool = False  # a motion is to be stopped: losing the camera now is worse than offline
 
     @property
@@ -41,6 +42,8 @@ class Health:
     @property
     def status(self) -> CameraStatus:
         """What is published."""
+        if self.online and self.stream:
+            return CameraStatus(state="degraded", reason=self.stream)
         return CameraStatus(state=self.state, reason=self.reason)
 
     def take(self, reply: Reply) -> None:
@@ -61,10 +64,10 @@ class Health:
         self.rebooting = True
         self.state, self.reason = "rebooting", "as ordered"
 
-    def rebooted(self) -> None:
-        """It is up again."""
+    def rebooted(self, *, why_not: str = "") -> None:
+        """It is up again, or nobody waits for it any longer."""
         self.rebooting = False
-        self.state, self.reason = "online", ""
+        self.state, self.reason = ("offline", why_not) if why_not else ("online", "")
 
     def _away(self, reply: Reply, state: State, reason: str) -> None:
         self.failures += 1
@@ -75,8 +78,10 @@ class Health:
         self.state, self.reason = state, reason
 
     def _there(self, reply: Reply) -> None:
-        if self.state != "online":
-            log.info("%s: online", self.name)
-        self.state, self.reason, self.failures = "online", "", 0
+        """It is online when it was asked where it looks (a camera without motors says no); nothing else counts."""
         self.latency += 0.2 * (reply.received - reply.sent - self.latency)
-        self.next_poll = reply.received + IDLE_S
+        if isinstance(reply.request, Status):
+            if self.state != "online":
+                log.info("%s: online", self.name)
+            self.state, self.reason, self.failures = "online", "", 0
+            self.next_poll = reply.received + IDLE_S

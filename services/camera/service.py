@@ -16,6 +16,7 @@ from services.camera.alarm.listener import HEARD, Heard
 from services.camera.alarm.motion import MotionWatch
 from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
+from services.camera.capabilities import Abilities
 from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.device import REPLY, Sender
 from services.camera.discovery import Discovery
@@ -84,6 +85,7 @@ class CameraService:
         self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes)
         self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=config.alarm)
         self.upkeep = Upkeep(config.name, config.clock, self.bulletin.facts, self._has_time)
+        self.abilities = Abilities(config.state and config.state / f"{config.name}-can.json", self._has_time)
         self._polling = False
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
@@ -142,8 +144,11 @@ class CameraService:
         motion = self.motion.tick(now, turning=turning, online=self.health.online)
         if motion is not None:
             self.bulletin.say(topics.CAMERA_MOTION, motion)
+            self._begin(self.feed.at_motion(motion.value), now)
         self.bulletin.facts.values["alarm"] = self.motion.fact
         self.bulletin.facts.complain("alarm", f"motion alarm {self.motion.fact}" if self.motion.trouble else "")
+        if self.abilities.present is not None:
+            self.bulletin.facts.values["can"] = self.abilities.present.words
         self.bulletin.facts.values["request_queue"] = str(len(self.stage.asked))
 
     def _has_time(self) -> bool:
@@ -196,6 +201,7 @@ class CameraService:
                 self.health.next_poll += REST_S - IDLE_S
             if self.health.online and not met:
                 yield from attempt(Identify())
+                self.stage.begin(self.abilities.meet(self.bulletin.identity, now), now, _nobody)
                 now = (yield from attempt(GetPicture())).received
                 self.upkeep.met()
                 if self.bulletin.turning:

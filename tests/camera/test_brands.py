@@ -17,6 +17,7 @@ from pydantic import SecretStr
 
 from services.camera import brands
 from services.camera.address import Address
+from services.camera.capabilities import Capabilities, GetCapabilities
 from services.camera.device import same
 from services.camera.requests import (
     Away,
@@ -27,6 +28,7 @@ from services.camera.requests import (
     GotoPreset,
     Identify,
     Identity,
+    MoveTo,
     Reading,
     Refused,
     SavePreset,
@@ -207,6 +209,12 @@ def test_a_preset_of_the_cameras_own_can_be_gone_to(driver: Camera, camera: simu
     wait_until(lambda: not same(reading(driver), before), "the camera to go")
 
 
+def test_a_position_that_the_firmware_takes_is_reached(brand: str) -> None:
+    with simulator(latency_s=0, profile="2020s-dahua") as camera, driving(brand, camera.url) as driver:
+        driver.send(MoveTo(351.0, 33.0, 2.0))
+        wait_until(lambda: same(reading(driver), Reading(351.0, 33.0, 2.0)), "the position to be reached")
+
+
 def test_a_snapshot_is_a_jpeg(driver: Camera) -> None:
     data = driver.send(Snapshot())
     assert isinstance(data, bytes)
@@ -219,6 +227,13 @@ def test_it_says_who_it_is(driver: Camera) -> None:
     assert isinstance(identity, Identity)
     assert (identity.model, identity.serial) == ("IP3M-941W", "AMC0000000000001")
     assert identity.version.startswith("2.420.AC00.15.R")
+
+
+def test_it_says_what_its_motors_can_without_moving(driver: Camera, camera: simulated.Simulated) -> None:
+    told = driver.send(GetCapabilities("motors"))
+    assert isinstance(told, Capabilities)
+    assert (told.presets, told.zoom) == (25, True)
+    assert not state(camera)["moving"]
 
 
 def test_a_wrong_password_is_a_bad_login_and_not_tried_on(brand: str, camera: simulated.Simulated) -> None:

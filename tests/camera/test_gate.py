@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import SecretStr
 
-from services.camera.requests import BadLogin, Locked
+from services.camera.requests import Away, BadLogin, Locked
 from services.camera.web.digest import Login
 from services.camera.web.gate import LONGEST_RETRY_S, RETRY_S, Book, Gate
 from services.errors import DeviceError
@@ -138,6 +138,46 @@ def test_a_camera_that_forgot_its_nonces_is_no_wrong_password_however_many_conne
         assert visitors.all_together() == [200] * 4
 
 
+def test_a_camera_that_refuses_good_logins_at_random_is_not_taken_for_a_wrong_password() -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    visitors.get()
+    camera.odd = 1
+    visitors.get()
+    for odd in (3, 4, 5):
+        camera.odd = odd
+        assert visitors.outcome("control") is Away
+        visitors.now += 3.0
+        while visitors.outcome("control") is Away:
+            visitors.now += 3.0
+        assert visitors.get() == 200
+
+
+def test_after_a_random_refusal_a_password_change_is_still_found_out() -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    visitors.get()
+    camera.odd = 1
+    visitors.get()
+    camera.password = "changed"
+    while visitors.outcome("control") is Away:
+        visitors.now += 1.0
+    assert visitors.outcome("control") is BadLogin
+    assert camera.failed <= 7
+
+
+def test_ten_seconds_after_a_random_refusal_three_failures_are_the_most_again() -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    visitors.get()
+    camera.odd = 1
+    visitors.get()
+    visitors.now += 10.0
+    camera.password = "changed"
+    assert visitors.outcome("control") is BadLogin
+    assert camera.failed == 3
+
+
 def test_stale_for_ever_is_given_up_without_a_verdict_on_the_password() -> None:
     camera = Camera()
     camera.stale, camera.odd = True, 99
@@ -188,7 +228,7 @@ def test_a_locked_account_is_told_and_later_asked_without_a_password() -> None:
 def test_the_pause_never_exceeds_the_longest() -> None:
     book, now = Book(), 0.0
     for _ in range(20):
-        book.close(now, locked=False)
+        book.close(now, "wrong")
         assert book.opens_at is not None
         assert book.opens_at - now <= LONGEST_RETRY_S
         now = book.opens_at
@@ -214,5 +254,18 @@ def test_an_answer_from_before_a_refusal_does_not_open_the_way_for_more() -> Non
     early = book.tries(urgent=False)
     late = book.tries(urgent=True)
     book.failed(0.0, sure=False)
-    book.passed(early)
+    book.passed(early, 0.0)
     assert (early, late, book.failures) == (0, 0, 1)
+
+
+def test_while_a_stop_is_owed_only_what_is_urgent_is_sent() -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    visitors.gate.owe(True)
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(visitors.get, "pictures")
+        assert visitors.get("control") == 200
+        assert (camera.served, waiting.done()) == (1, False)
+        visitors.gate.owe(False)
+        assert waiting.result(WAIT_S) == 200
+    assert camera.served == 2

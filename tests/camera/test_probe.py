@@ -32,7 +32,7 @@ from services.simulators.camera.profiles import Profile
 from tests.camera.bench import PASSWORD, SHIPPED, simulator
 
 LATENCY_S = 0.03
-AT_ONCE = 3
+AT_ONCE = 4
 UNSEEN = {  # switches that cannot be seen from outside, or only by doing harm
     "boot_s", "drowsy_s", "latency_spread_s", "latency_tail", "lockout_failures", "lockout_of", "lockout_s",
     "max_connections", "over_limit", "pan_acceleration", "pan_speeds", "snapshot_drop", "spurious_401", "status_lag_s",

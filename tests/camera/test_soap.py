@@ -9,16 +9,19 @@ from xml.etree import ElementTree
 
 import httpx
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import SecretStr
 
 from services.camera.address import Address
-from services.camera.brands.onvif import Onvif, Profile, read_reading
-from services.camera.requests import Away, BadLogin, Locked, Refused, Status
+from services.camera.brands.onvif import Onvif, Profile, position, read_reading
+from services.camera.requests import Away, BadLogin, Locked, Reading, Refused, Status
 from services.camera.web.gate import Gate
 from services.camera.web.soap import FIRST, Soap, envelope, read_envelope, token
 
 ADDRESS = Address("http://192.0.2.10", "admin", SecretStr("secret123"))
 NOW = 1_768_000_000.0
+GENERIC = Profile("p", (-1.0, 1.0), (-1.0, 1.0), (0.0, 1.0))
 
 
 def fault(*codes: str) -> bytes:
@@ -122,6 +125,16 @@ def test_the_generic_space_is_the_whole_travel(at: tuple[float, float], pan: flo
     assert (found.pan, found.tilt, found.zoom, found.moving) == (pan, tilt, 4.0, True)
 
 
+@given(pan=st.floats(186.0, 538.9).map(lambda pan: pan % 360.0), tilt=st.floats(-10.0, 108.0), zoom=st.floats(0.0, 8.0))
+def test_a_position_is_read_as_it_was_written(pan: float, tilt: float, zoom: float) -> None:
+    for profile in (GENERIC, Profile("p", (-180.0, 180.0), (-120.0, 20.0), (0.0, 1.0))):
+        x, y, z = position(Reading(pan, tilt, zoom), profile, ADDRESS)
+        again = read_reading(status(x, y, z), profile, ADDRESS)
+        assert abs((again.pan - pan + 180.0) % 360.0 - 180.0) < 0.02
+        assert abs(again.tilt - tilt) < 0.02
+        assert abs(again.zoom - zoom) < 0.02
+
+
 def test_a_space_in_degrees_is_taken_as_it_is() -> None:
     found = read_reading(status(-30.0, -45.0), Profile("p", (-180.0, 180.0), (-90.0, 10.0), (0.0, 1.0)), ADDRESS)
     assert (found.pan, found.tilt) == (330.0, 45.0)
@@ -133,10 +146,10 @@ def test_a_position_that_is_no_number_is_no_position(x: str) -> None:
         read_reading(status(x, 0.0), Profile("p", (-1.0, 1.0), (-1.0, 1.0), (0.0, 1.0)), ADDRESS)
 
 
-def status(x: object, y: object) -> ElementTree.Element:
+def status(x: object, y: object, z: object = 0.5) -> ElementTree.Element:
     return ElementTree.fromstring(
         '<a xmlns="http://www.onvif.org/ver10/schema"><Position>'
-        f'<PanTilt x="{x}" y="{y}"/><Zoom x="0.5"/></Position><MoveStatus><PanTilt>MOVING</PanTilt></MoveStatus></a>'
+        f'<PanTilt x="{x}" y="{y}"/><Zoom x="{z}"/></Position><MoveStatus><PanTilt>MOVING</PanTilt></MoveStatus></a>'
     )
 
 

@@ -5,9 +5,12 @@ Each does something bad, asserts what is promised about it, and returns the figu
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
@@ -167,3 +170,131 @@ def apart(one: float, other: float) -> float:
 
 
 KILLS = (kill_service, kill_supervisor, kill_broker)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What goes wrong, by its name at the side door; how the camera's status reads then; what else shows it."""
+
+    name: str
+    states: tuple[str, ...]
+    settings: Mapping[str, object] = field(default_factory=dict)
+    also: str = ""  # another order of the side door, at the same time
+    shows: Callable[[Client], bool] = lambda bus: True  # besides the status; it is asked until it holds
+    back_s: float = 20.0  # after its end: everything is well again
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def alarm_in_trouble(bus: Client) -> bool:
+    """Whether the motion alarm says that it does not work."""
+    return b'"value":-1' in newest(bus, "camera/ip1/motion")
+
+
+def slow_answers(bus: Client) -> bool:
+    """Whether the diagnostics tell of slow answers."""
+    said = newest(bus, "diagnostics/camera/ip1")
+    return bool(said) and float(json.loads(said)["values"]["http_latency_ms"]) > 500
+
+
+FAULTS = (
+    Fault("drop", ("offline",), also="drop", shows=alarm_in_trouble),
+    Fault("500", ("offline", "degraded")),
+    Fault("hang", ("offline",), shows=alarm_in_trouble),
+    Fault("slow", ("online", "degraded"), shows=slow_answers),
+    Fault("silent_events", ("online",), shows=alarm_in_trouble),
+    Fault("nonce", ("online",)),
+    Fault("cut", ("offline",), shows=alarm_in_trouble),
+    Fault("cut", ("offline",), {"refuses": True}, shows=alarm_in_trouble),
+    Fault("reboot", ("offline", "rebooting")),
+    Fault("locked", ("locked",), back_s=40.0),
+    Fault("rights", ("online",)),
+)
+
+
+def fault(flat: SmallFlat, which: Fault, *, camera: str = "ip1") -> float:
+    """Something goes wrong with the camera for a while; seconds until the status (and the rest) told of it.
+
+    Afterwards everything is well again, without a restart.
+    """
+    door, service = flat.doors[camera], flat.pid(f"camera-{camera}")
+    with flat.client(f"camera/{camera}/#", f"diagnostics/camera/{camera}") as bus:
+        bus.payload(f"camera/{camera}/motion", lambda motion: motion.value != -1, 20.0)
+        began = time.monotonic()
+        door.tell("fault", name=which.name, **which.settings)
+        if which.also:
+            door.tell(which.also)
+        try:
+            wait(bus, lambda: state_of(bus, camera) in which.states and which.shows(bus), NOTICED_S, str(which))
+            seconds = time.monotonic() - began
+        finally:
+            door.tell("fault", name=which.name, on=False)
+        well(flat, bus, camera, which.back_s)
+    assert flat.pid(f"camera-{camera}") == service, "it was restarted"
+    return seconds
+
+
+def well(flat: SmallFlat, bus: Client, camera: str, limit_s: float) -> None:
+    """The camera is online, its alarm listens, and an order is done; within the limit."""
+    wait(bus, lambda: state_of(bus, camera) == "online", limit_s, "online again")
+    wait(bus, lambda: not alarm_in_trouble(bus), limit_s, "the alarm to work again")
+    answers: list[str] = []
+
+    def done() -> bool:
+        result = bus.order(camera, "Flip", "True")
+        answers.append(f"{result.state} {result.error or ''}")
+        return result.state == "done"
+
+    peers.wait_until(done, f"an order to be done; {answers}", limit_s)
+
+
+def change_password(flat: SmallFlat, *, camera: str = "ip1") -> float:
+    """Somebody changes the password, and later changes it back. Logins that failed until then, over all connections."""
+    door = flat.doors[camera]
+    with flat.client(f"camera/{camera}/#") as bus:
+        bus.payload(f"camera/{camera}/motion", lambda motion: motion.value != -1, 20.0)
+        before = failed(door)
+        door.tell("fault", name="password")
+        door.tell("drop")  # the endless answers have to log in anew
+        try:
+            wait(bus, lambda: state_of(bus, camera) == "bad_login", NOTICED_S, "bad_login")
+            bus.say(f"camera/{camera}/snapshot/get", "now")
+            bus.say(f"camera/{camera}/order/Goto", "Kitchen")
+            bus.collect(3.0)
+            tried = failed(door) - before
+        finally:
+            door.tell("fault", name="password", on=False)
+        well(flat, bus, camera, 40.0)
+    return float(tried)
+
+
+def failed(door: Door) -> int:
+    """Logins with a wrong password that the camera has met."""
+    return int(door.state()["door"]["wrong"])
+
+
+def idle(flat: SmallFlat, *, camera: str = "ip1", seconds: float = 20.0) -> float:
+    """Nobody wants anything: requests per second that the camera meets."""
+    door = flat.doors[camera]
+    began, before = time.monotonic(), [entry["time"] for entry in door.log()]
+    with flat.client() as bus:
+        bus.collect(seconds)
+    after = [entry["time"] for entry in door.log()]
+    return sum(one > before[-1] for one in after) / (time.monotonic() - began)
+
+
+def wait(bus: Client, happened: Callable[[], bool], limit_s: float, what: str) -> None:
+    """Listens until it happened."""
+
+    def looked() -> bool:
+        bus.pump()
+        return happened()
+
+    peers.wait_until(looked, what, limit_s)
+
+
+def state_of(bus: Client, camera: str) -> str:
+    """The newest state that was heard of a camera."""
+    said = newest(bus, f"camera/{camera}/status")
+    return str(json.loads(said)["state"]) if said else ""

@@ -19,7 +19,8 @@ import httpx
 
 from services.camera import requests
 from services.camera.address import Address
-from services.camera.requests import Away, Camera, Identity, Reading, Refused, Start
+from services.camera.capabilities import Capabilities, GetCapabilities
+from services.camera.requests import Away, Camera, Identity, Reading, Refused, Start, StreamAddress
 from services.camera.web.connection import SNAPSHOT, connection, fetch
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
@@ -58,6 +59,7 @@ class Onvif:
         self.soap = Soap(self.http, address, gate, urgent=urgent)
         self._paths: dict[str, str] = {DEVICE: FIRST}
         self._profile: Profile | None = None
+        self._node_token = ""
 
     def close(self) -> None:
         """Ends the connection."""
@@ -67,7 +69,13 @@ class Onvif:
         """One request of ours, mostly one of the camera's; DeviceError as in `requests.py`."""
         match request:
             case Start():
-                return self._command("ContinuousMove", f"{velocity(request)}<Timeout>PT{ITSELF_S}S</Timeout>")
+                return self._command("ContinuousMove", f"{velocity(request)}{_token('Timeout', f'PT{ITSELF_S}S')}")
+            case requests.TurnFor(right, down, zoom, seconds):
+                speeds = vector("Velocity", right / 100, -down / 100, zoom / 100)
+                return self._command("ContinuousMove", speeds + _token("Timeout", f"PT{seconds:.2f}S"))
+            case requests.MoveTo(pan, tilt, zoom, form="PositionABS"):
+                where = position(Reading(pan, tilt, zoom), self._known_profile(), self.address)
+                return self._command("AbsoluteMove", vector("Position", *where))
             case requests.Stop():
                 return self._command("Stop", "<PanTilt>true</PanTilt><Zoom>true</Zoom>")
             case requests.Status():
@@ -80,8 +88,12 @@ class Onvif:
                 return self._clear(number)
             case requests.Snapshot():
                 return self._snapshot()
+            case requests.FindStream():
+                return self._stream()
             case requests.Identify():
                 return self._identify()
+            case GetCapabilities("motors"):
+                return read_capabilities(self._node())
             case requests.Reboot():
                 self._ask(DEVICE, "SystemReboot")
                 return None
@@ -109,9 +121,14 @@ class Onvif:
             mine = next((one for one in told if one.find(f"{SCHEMA}PTZConfiguration") is not None), None)
             if mine is None:
                 raise Refused("the camera has no ONVIF profile with motors")
-            node = mine.findtext(f"{SCHEMA}PTZConfiguration/{SCHEMA}NodeToken") or ""
-            self._profile = read_profile(mine.get("token", ""), self._ask(PTZ, "GetNode", _token("NodeToken", node)))
+            self._node_token = mine.findtext(f"{SCHEMA}PTZConfiguration/{SCHEMA}NodeToken") or ""
+            self._profile = read_profile(mine.get("token", ""), self._node())
         return self._profile
+
+    def _node(self) -> Element:
+        if not self._node_token:
+            self._known_profile()
+        return self._ask(PTZ, "GetNode", _token("NodeToken", self._node_token))
 
     def _ptz(self, action: str, inner: str = "") -> Element:
         return self._ask(PTZ, action, _token("ProfileToken", self._known_profile().token) + inner)
@@ -152,6 +169,16 @@ class Onvif:
             raise Away(f"expected a JPEG, got {answer.status_code} {answer.content[:40]!r}")
         return answer.content
 
+    def _stream(self) -> StreamAddress:
+        """On the host that the configuration names and its port; only the path is the camera's word."""
+        setup = f'<Stream xmlns="{SCHEMA[1:-1]}">RTP-Unicast</Stream>'
+        setup += f'<Transport xmlns="{SCHEMA[1:-1]}"><Protocol>RTSP</Protocol></Transport>'
+        mine = _token("ProfileToken", self._known_profile().token)
+        told = self._ask(MEDIA, "GetStreamUri", f"<StreamSetup>{setup}</StreamSetup>{mine}")
+        host = httpx.URL(self.address.url).host
+        where = f"[{host}]" if ":" in host else host
+        return StreamAddress(f"rtsp://{where}:{self.address.rtsp_port}{_local(told.findtext(f'.//{SCHEMA}Uri') or '')}")
+
     def _identify(self) -> Identity:
         told = self._ask(DEVICE, "GetDeviceInformation")
         keys = ("Model", "SerialNumber", "FirmwareVersion")
@@ -166,11 +193,16 @@ def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:
 def velocity(request: Start) -> str:
     """The speeds of a motion, 1 to 8, as eighths of the top speed."""
     right, down, zoom = request.direction.value
-    if zoom:
-        return f'<Velocity><Zoom xmlns="{SCHEMA[1:-1]}" x="{zoom}"/></Velocity>'
     pan_speed = min(8, max(1, request.speed)) / 8
     tilt_speed = min(8, max(1, request.tilt_speed or request.speed)) / 8 if right else pan_speed
-    return f'<Velocity><PanTilt xmlns="{SCHEMA[1:-1]}" x="{right * pan_speed}" y="{-down * tilt_speed}"/></Velocity>'
+    return vector("Velocity", right * pan_speed, -down * tilt_speed, zoom)
+
+
+def vector(kind: str, x: float, y: float, z: float) -> str:
+    """Numbers for each motor; speeds of zero are left out, for a camera may stop that motor for them."""
+    turn = f'<PanTilt xmlns="{SCHEMA[1:-1]}" x="{x:.5f}" y="{y:.5f}"/>' if kind == "Position" or x or y else ""
+    zoom = f'<Zoom xmlns="{SCHEMA[1:-1]}" x="{z:.5f}"/>' if kind == "Position" or z else ""
+    return f"<{kind}>{turn}{zoom}</{kind}>"
 
 
 def read_profile(token: str, node: Element) -> Profile:
@@ -178,6 +210,19 @@ def read_profile(token: str, node: Element) -> Profile:
     pan = _bounds(node, "AbsolutePanTiltPositionSpace", "XRange", GENERIC)
     tilt = _bounds(node, "AbsolutePanTiltPositionSpace", "YRange", GENERIC)
     return Profile(token, pan, tilt, _bounds(node, "AbsoluteZoomPositionSpace", "XRange", (0.0, 1.0)))
+
+
+def read_capabilities(node: Element) -> Capabilities:
+    """What the motors' node tells; every ContinuousMove can be told when to end."""
+    kinds = {one.tag.removeprefix(SCHEMA) for one in node.iterfind(f".//{SCHEMA}SupportedPTZSpaces/*")}
+    most = node.findtext(f".//{SCHEMA}MaximumNumberOfPresets") or ""
+    return Capabilities(
+        presets=int(most) if most.isdigit() else 0,
+        absolute="AbsolutePanTiltPositionSpace" in kinds,
+        relative="RelativePanTiltTranslationSpace" in kinds,
+        timed="ContinuousPanTiltVelocitySpace" in kinds,
+        zoom="ContinuousZoomVelocitySpace" in kinds,
+    )
 
 
 def read_reading(told: Element, profile: Profile, address: Address) -> Reading:
@@ -198,6 +243,21 @@ def read_reading(told: Element, profile: Profile, address: Address) -> Reading:
     return Reading(
         round(pan, 2) % 360.0, round(tilt, 2), round(wide + _share(z, profile.zoom) * (close - wide), 2), moving
     )
+
+
+def position(goal: Reading, profile: Profile, address: Address) -> tuple[float, float, float]:
+    """The other way: readings in the camera's spaces, never beyond their bounds."""
+    (low, high), (dead, after), (wide, close) = address.tilt_range, address.pan_dead_arc, address.zoom_range
+    if profile.in_degrees:
+        x, y = (goal.pan + 180.0) % 360.0 - 180.0, -goal.tilt
+    else:
+        x = _within(((goal.pan - after) % 360.0) / (360.0 - (after - dead)), profile.pan)
+        y = _within((high - goal.tilt) / (high - low), profile.tilt)
+    return x, y, _within((goal.zoom - wide) / (close - wide), profile.zoom)
+
+
+def _within(share: float, bounds: Bounds) -> float:
+    return bounds[0] + min(max(share, 0.0), 1.0) * (bounds[1] - bounds[0])
 
 
 def _share(value: float, bounds: Bounds) -> float:

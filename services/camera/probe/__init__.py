@@ -1,6 +1,7 @@
 """First contact with a camera: finds out what it is and how its firmware behaves, without harm.
 
 From outside in: `command` (what a user starts), `contact` (the order of things), `login`, `firmware`, `stream` and
-`turning` (each asks some questions), `wire` (sends and remembers). What was found is a `findings.Findings`; `paper` and
-`anonymous` make files of it, `show` the text on a terminal. It is made for cameras with Dahua's HTTP API.
+`turning` (each asks some questions; `turner` runs the motors), `wire` (sends and remembers). What was found is a
+`findings.Findings`; `paper` and `anonymous` make files of it, `show` the text on a terminal. It is made for cameras
+with Dahua's HTTP API.
 """

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from services.camera.brands.dahua import ptz, system
+from services.camera.brands.dahua.capabilities import status_form
 from services.camera.brands.dahua.replies import read_table
 from services.camera.probe.findings import Findings, share
 from services.camera.probe.wire import PICTURE, Exchange, Wire
@@ -76,22 +77,13 @@ def channels(wire: Wire, found: Findings) -> None:
     if not good:
         raise Refused("the camera tells its position on neither channel 1 nor 0: it has no motors, or no right to them")
     body = next(reversed(good.values())).text
-    found.switches |= {"status_form": read_status_form(body), "position_key": _position_key(body)}
+    found.switches |= {"status_form": status_form(body), "position_key": _position_key(body)}
     reading = ptz.read_status(body)
     found.pose = (reading.pan, reading.tilt, reading.zoom)
 
 
 def _position_key(body: str) -> str | None:
     return next((key for key in ("Postion", "Position") if f"status.{key}[0]" in body), None)
-
-
-def read_status_form(body: str) -> str:
-    """a: with presets; b: with lens fields; c: short; newest: with the angles once more. Pure."""
-    if "status.AbsPosition" in body or "status.PanTiltStatus" in body:
-        return "newest"
-    if "status.Focus." in body:
-        return "b"
-    return "a" if "status.MoveStatus" in body else "c"
 
 
 def latency(wire: Wire, found: Findings) -> None:

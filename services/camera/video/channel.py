@@ -129,16 +129,17 @@ class Channel:
             "stream_connections": str(flow.connections),
         }
 
-    def complaint(self) -> str:
-        """What is wrong with the stream, or advice; empty when all is well or it is off."""
-        flow = self.reader.flow
+    def trouble(self) -> str:
+        """Why no moving picture comes although it should; empty when all is well or it is off."""
         if not self.on:
             return ""
-        if flow.trouble:
-            return f"stream: {flow.trouble}"
-        if self._still(self.clock()):
-            return "stream: no picture comes"
-        return ADVICE if flow.queueing else ""
+        if self.reader.flow.trouble:
+            return f"stream: {self.reader.flow.trouble}"
+        return "stream: no picture comes" if self._still(self.clock()) else ""
+
+    def complaint(self) -> str:
+        """What is wrong with the stream, or advice."""
+        return self.trouble() or (ADVICE if self.on and self.reader.flow.queueing else "")
 
     def ask(self) -> None:
         """Any thread: somebody waits for a picture; one that flows comes without a snapshot."""

@@ -39,6 +39,7 @@ class Feed:
         self.upright = Upright(config.picture.flip, config.picture.mirror, config.kind)
         self.say = say
         self._shooting = False
+        self._motion = 0
 
     def check(self, order: orders.Broadcast) -> None:
         """Refused when nothing could be switched on; off is possible while the camera is away too."""
@@ -67,6 +68,7 @@ class Feed:
         """As long as the service: finds the stream when it is wanted, feeds those who look while none flows."""
         while (channel := self.channel) is not None:
             now = yield from wait(now + (STEP_S if channel.starving else IDLE_S))
+            self.health.stream = channel.trouble()
             if not channel.on or not self.health.online:
                 continue
             if channel.found is None:
@@ -88,9 +90,10 @@ class Feed:
         data = self.upright.jpeg(cast(bytes, reply.result))
         self.say(CAMERA_SNAPSHOT.message(data, cam=self.config.name))
 
-    def at_motion(self) -> Plan[None]:
-        """A snapshot because something has begun to move; nothing where that is not configured."""
-        if self.config.snapshot.at_motion and self.health.online:
+    def at_motion(self, value: int) -> Plan[None]:
+        """A snapshot when motion begins (the value becomes 1), where that is configured."""
+        began, self._motion = value == 1 and self._motion != 1, value
+        if began and self.config.snapshot.at_motion and self.health.online:
             yield from self.published()
 
     def every_so_often(self, now: float) -> Plan[None]:

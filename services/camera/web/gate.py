@@ -14,18 +14,26 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Literal
 
 from services.camera.requests import Away, BadLogin, Locked
+from services.errors import DeviceError
 
 MOST_FAILURES = 3
+MOST_ODD, ODD_WINDOW_S = 7, 10.0
 RETRY_S, LONGEST_RETRY_S = 120.0, 1800.0  # a lock lasts about 30 minutes
 ODD_S = 0.5  # an odd refusal of a valid login is over after so long
+WAY_S = 5.0  # who waits longer for a stop that goes first gives up
 PATIENCE_S = 30.0  # who waits longer for the outcome of other logins gives up
 
 
 @dataclass
 class Book:
-    """What the gate knows, without clock and threads; times are seconds of any one clock."""
+    """What the gate knows, without clock and threads; times are seconds of any one clock.
+
+    A camera that has just refused a login and then taken it (`ODD_WINDOW_S`) refuses at random: there three failures
+    prove less, so a few single tries follow at growing distances before it counts as a wrong password.
+    """
 
     retry_s: float = RETRY_S
     failures: int = 0  # in a row
@@ -33,37 +41,33 @@ class Book:
     flying: int = 0  # logins whose outcome is not known yet
     others: int = 0  # of these, the ones that are not urgent
     closings: int = 0  # in a row
-    locked: bool = False
+    why: Literal["", "wrong", "locked", "odd"] = ""
     opens_at: float | None = None  # None: it is open
     closed_s: float = 0.0  # how long it was closed the last time
+    odd_until: float = float("-inf")
 
-    @property
-    def most(self) -> int:
-        """How many logins may fail in a row; one when it has been closed before."""
-        return 1 if self.closings else MOST_FAILURES
-
-    def closed(self, now: float) -> BadLogin | None:
+    def closed(self, now: float) -> DeviceError | None:
         """Why nobody may try at this time; None: it is open."""
         if self.opens_at is None or now >= self.opens_at:
             return None
-        wait = f"nobody tries again for {self.closed_s:.0f} s"
-        if self.locked:
-            return Locked(f"the camera has locked this account after wrong passwords; {wait}", self.opens_at - now)
-        return BadLogin(f"the camera does not accept this user and password; {wait}", self.opens_at - now)
+        again = f"nobody tries again for {self.closed_s:.0f} s"
+        if self.why == "odd":
+            return Away(f"the camera refuses good logins at random; {again}")
+        if self.why == "locked":
+            return Locked(f"the camera has locked this account after wrong passwords; {again}", self.opens_at - now)
+        return BadLogin(f"the camera does not accept this user and password; {again}", self.opens_at - now)
 
     def may_try(self, *, urgent: bool) -> bool:
         """Whether one more login can be afforded whatever becomes of those that are on their way.
 
         What is urgent waits only for the last of the tries; the rest goes one by one, and alone after a failure.
         """
-        if self.failures + self.flying >= self.most:
+        if self.failures + self.flying >= MOST_FAILURES:
             return self.flying == 0
         return urgent or (self.others == 0 and (self.failures == 0 or self.flying == 0))
 
     def tries(self, *, urgent: bool) -> int:
         """One more is on its way; the number is for `passed`."""
-        if self.failures >= self.most:
-            self.failures = 0
         self.flying += 1
         self.others += not urgent
         return self.ever
@@ -73,26 +77,35 @@ class Book:
         self.flying -= 1
         self.others -= not urgent
 
-    def passed(self, number: int) -> None:
+    def passed(self, number: int, now: float) -> None:
         """A login was accepted; it says nothing about those that failed after it was sent."""
         if number == self.ever:
-            self.failures, self.closings, self.locked, self.opens_at = 0, 0, False, None
+            if self.failures and self.why != "locked":
+                self.odd_until = now + ODD_WINDOW_S
+            self.failures, self.closings, self.why, self.opens_at = 0, 0, "", None
 
     def failed(self, now: float, *, sure: bool) -> None:
         """A login was refused; `sure`: it was a repeat with a new challenge, some time after the first."""
         self.failures += 1
         self.ever += 1
-        if sure or self.failures >= self.most:
-            self.close(now, locked=False)
+        if now < self.odd_until and not self.closings:
+            if self.failures >= MOST_ODD:
+                self.close(now, "wrong")
+            elif self.failures >= MOST_FAILURES:
+                self._shut(now, 2.0 ** (self.failures - MOST_FAILURES), "odd")
+        elif sure or self.failures >= MOST_FAILURES:
+            self.close(now, "wrong")
 
-    def close(self, now: float, *, locked: bool) -> None:
-        """Nobody tries for a while."""
+    def close(self, now: float, why: Literal["wrong", "locked"]) -> None:
+        """Nobody tries for a while, and then one alone."""
         if self.closed(now) is None:
-            self.closed_s = min(LONGEST_RETRY_S, self.retry_s * 2**self.closings)
-            self.opens_at = now + self.closed_s
+            self._shut(now, min(LONGEST_RETRY_S, self.retry_s * 2**self.closings), why)
             self.closings += 1
-            self.failures = self.most
-        self.locked = self.locked or locked
+        self.failures = max(self.failures, MOST_FAILURES)
+        self.why = "locked" if why == "locked" else self.why
+
+    def _shut(self, now: float, seconds: float, why: Literal["wrong", "locked", "odd"]) -> None:
+        self.closed_s, self.opens_at, self.why = seconds, now + seconds, why
 
 
 class Try:
@@ -105,7 +118,7 @@ class Try:
     def passed(self) -> None:
         """The camera knows us (it may refuse what was asked, for want of rights)."""
         with self._gate.changed:
-            self._gate.book.passed(self._number)
+            self._gate.book.passed(self._number, self._gate.clock())
 
     def failed(self, *, sure: bool = False) -> None:
         """The camera does not; `sure` when this was a repeat after ODD_S with a new challenge."""
@@ -126,6 +139,19 @@ class Gate:
         self.clock = clock
         self.pause = pause
         self.changed = threading.Condition()
+        self.stop_owed = False  # the camera was lost while it turned: a stop is to be the first that reaches it
+
+    def owe(self, on: bool) -> None:
+        """A stop is owed from now on, or was confirmed."""
+        with self.changed:
+            self.stop_owed = on
+            self.changed.notify_all()
+
+    def give_way(self, *, urgent: bool) -> None:
+        """Before anything is sent: lets a stop go first. Away when that takes too long."""
+        with self.changed:
+            if not urgent and not self.changed.wait_for(lambda: not self.stop_owed, WAY_S):
+                raise Away("a stop goes first, and the camera does not answer it")
 
     def check(self) -> None:
         """BadLogin or Locked when nobody may try now."""
@@ -136,7 +162,7 @@ class Gate:
     def locked(self) -> Locked:
         """The camera said that the account is locked; the error to raise."""
         with self.changed:
-            self.book.close(self.clock(), locked=True)
+            self.book.close(self.clock(), "locked")
             why = self.book.closed(self.clock())
         return why if isinstance(why, Locked) else Locked("the camera has locked this account after wrong passwords")
 
@@ -146,6 +172,7 @@ class Gate:
 
         BadLogin or Locked when nobody may try now, Away when the others take too long. `urgent` is for control.
         """
+        self.give_way(urgent=urgent)
         with self.changed:
             if not self.changed.wait_for(lambda: self._open(urgent), PATIENCE_S):
                 raise Away("other logins to this camera have no answer yet")

@@ -94,6 +94,22 @@ class Door:
         """Who is locked out for failures from this address: the account, or the address alone."""
         return self._records.setdefault(address if self.profile.lockout_of == "address" else "", Record())
 
+    def judge_viewer(self, method: str, header: str | None, now: float) -> bool:
+        """Counts and locks out over RTSP too, where the response has no qop. Says nothing of the nonce."""
+        record = self.record()
+        if self.locked or now < record.locked_until:
+            return self._refused("locked").passed
+        if header is None:
+            return True  # a challenge follows
+        if header.lower().startswith("basic "):
+            right = header[6:].strip().encode() == self._basic
+        else:
+            said = fields(header)
+            asked = hashed(f"{method}:{said.get('uri', '')}")
+            right = said.get("response") == hashed(f"{self._ha1['MD5']}:{said.get('nonce', '')}:{asked}")
+            right = right and said.get("username") == self.account[0]
+        return right or self._wrong(record, now).passed
+
     def forget(self) -> None:
         """Drops every nonce (a reboot)."""
         self._used.clear()

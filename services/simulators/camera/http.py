@@ -6,39 +6,27 @@ import socket
 import struct
 import sys
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Generator
+from contextlib import closing, suppress
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from socketserver import TCPServer
+from http.server import BaseHTTPRequestHandler
 from threading import Event, Lock
 from typing import Any
 
-from services.simulators.camera import events
+from services.simulators.camera import audio
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, Verdict
+from services.simulators.camera.endless import ENDLESS
 from services.simulators.camera.faults import Faults, Network
 from services.simulators.camera.messages import Answer, Request, read, refusal, spelt
 from services.simulators.camera.onvif.service import Onvif
-from services.simulators.camera.view.picture import Pictures, Stream
+from services.simulators.camera.port import Port
+from services.simulators.camera.view.picture import Pictures
 
 IMAGE = "image/jpeg"
 LOG_LENGTH = 2000
 SOAP_BYTES = 1 << 20
-HEARTBEATS_S = (1.0, 60.0)
 ROOT = b"<html><head><title>WEB</title></head><body></body></html>"
-
-
-class Port(ThreadingHTTPServer):
-    """A port that asks no name server for its own name, and waits for its threads when it is closed."""
-
-    daemon_threads = False
-    request_queue_size = 64
-
-    def server_bind(self) -> None:
-        """Binds; the name is the address."""
-        TCPServer.server_bind(self)
-        self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
 
 
 class CameraServer(Port):
@@ -51,6 +39,7 @@ class CameraServer(Port):
         self.device, self.door, self.pictures, self.clock = device, door, pictures, clock
         self.closing, self.log = Event(), deque[dict[str, Any]](maxlen=LOG_LENGTH)
         self.faults, self.network = Faults(), Network()
+        self.cuts: list[Callable[[], None]] = []  # how the connections of other ports are cut
         self.running = Event()  # cleared while frozen
         self.running.set()
         self.control, self.snapshot, self._lock = Lock(), Lock(), Lock()
@@ -67,10 +56,26 @@ class CameraServer(Port):
         with self._lock:
             return self.door.judge(method, target, header, self.clock(), address)
 
+    def judge_viewer(self, method: str, header: str | None) -> bool:
+        """The same for RTSP, where the challenge is another's."""
+        with self._lock:
+            return self.door.judge_viewer(method, header, self.clock())
+
     @property
     def is_off(self) -> bool:
         """Whether nobody is answered: it restarts, or is switched off, or a router says that it is not there."""
         return self.device.booting(self.clock()) or self.closing.is_set() or self.network.refuses
+
+    @property
+    def shows_pictures(self) -> bool:
+        """Whether new pictures go out."""
+        way = self.running.is_set() and self.network.up.is_set()
+        return way and not self.faults.frozen_stream and not self.is_off
+
+    @property
+    def turns_viewers_away(self) -> bool:
+        """Whether a new RTSP connection is closed at once."""
+        return self.faults.always == "close" or not self.network.up.is_set()
 
     @property
     def connected(self) -> int:
@@ -105,10 +110,10 @@ class CameraServer(Port):
             self.door.forget()
         self.drop()
 
-    def challenges(self) -> list[str]:
+    def challenges(self, *, stale: bool = False) -> list[str]:
         """What the door asks of somebody who said nothing."""
         with self._lock:
-            return self.door.challenges()
+            return self.door.challenges(stale=stale)
 
     def drop(self) -> None:
         """Cuts every connection."""
@@ -117,6 +122,12 @@ class CameraServer(Port):
                 with suppress(OSError):
                     connection.shutdown(socket.SHUT_RDWR)
         self.device.events.wake_all()
+        self.cut_streams()
+
+    def cut_streams(self) -> None:
+        """Ends the RTSP connections."""
+        for cut in self.cuts:
+            cut()
 
     def switch_off(self) -> None:
         """Ends every wait and connection, so that `server_close` finds no thread left."""
@@ -181,19 +192,31 @@ class Connection(BaseHTTPRequestHandler):
     do_POST = do_GET  # noqa: N815 (the base class looks for these names)
 
     def _serve(self, request: Request, entry: dict[str, Any]) -> None:
-        special = {("snapshot", ""): self._snapshot, ("mjpg/video", ""): self._video}
-        special[("eventManager", "attach")] = self._events
-        how = special.get((request.cgi, request.action), self._control)
-        how(request, entry)
+        endless = ENDLESS.get((request.cgi, request.action))
+        if (
+            request.cgi == "audio" and request.text("channel", "1") == "0"
+        ):  # never good here, and this is how it says so
+            self._challenge(Verdict(False, self.server.challenges(stale=True)), entry)
+        elif request.cgi == "audio" and request.action == "postAudio" and self.command == "POST":
+            self._speaker(entry)
+        elif endless is not None:
+            self._endless(endless(self.server, request), entry)
+        elif request.cgi == "snapshot":
+            self._snapshot(request, entry)
+        else:
+            self._control(request, entry)
 
     def _control(self, request: Request, entry: dict[str, Any]) -> None:
         """One at a time, and it acts when it has been processed."""
+        encoders = self.server.device.tables.encoders
         with self.server.control:
             self.server.delay(self.server.device.latency.control(self.server.clock()))
             answer = self.server.device.answer(request, self.server.clock())
         self._send(answer, entry)
         if self.server.device.booting(self.server.clock()):
             self.server.went_down()
+        elif self.server.device.tables.encoders != encoders:
+            self.server.cut_streams()
 
     def _soap(self, entry: dict[str, Any]) -> None:
         """ONVIF checks logins itself, message by message."""
@@ -222,35 +245,18 @@ class Connection(BaseHTTPRequestHandler):
             return self._fail(how, entry)
         return self._send(Answer(self.server.faults.picture(data), content_type=IMAGE), entry)
 
-    def _video(self, request: Request, entry: dict[str, Any]) -> None:
-        stream: Stream = "ExtraFormat" if request.text("subtype", "0") != "0" else "MainFormat"
-        kind = f"multipart/x-mixed-replace; boundary={events.BOUNDARY}"
+    def _speaker(self, entry: dict[str, Any]) -> None:
+        length, kind = self.headers.get("Content-Length", ""), self.headers.get("Content-Type", "")
         entry["status"] = 200
-        self._write(f"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Type: {kind}\r\n\r\n".encode())
-        while not self.server.closing.is_set():
-            self.server.running.wait()
-            data = self.server.pictures.jpeg(stream, self.server.clock())
-            head = f"--{events.BOUNDARY}\r\nContent-Type: {IMAGE}\r\nContent-Length: {len(data)}\r\n\r\n"
-            self._write(head.encode() + data + b"\r\n")
-            self.server.closing.wait(1 / self.server.pictures.fps(stream))
+        answer = audio.speaker(self.server, self.rfile, int(length) if length.isdigit() else 0, kind)
+        with suppress(OSError):  # whoever sent it has often gone
+            self._send(answer, entry)
 
-    def _events(self, request: Request, entry: dict[str, Any]) -> None:
-        least, most = HEARTBEATS_S
-        beat = request.text("heartbeat")
-        every = min(max(float(beat), least), most) if beat.isdigit() else most
-        subscription = self.server.device.events.subscribe(events.wanted(request.text("codes")))
+    def _endless(self, chunks: Generator[bytes], entry: dict[str, Any]) -> None:
         entry["status"] = 200
-        try:
-            self._write(events.START)
-            while not self.server.closing.is_set():
-                text = subscription.next(every)
-                self.server.running.wait()
-                if text == "":
-                    return
-                if text or (beat and self.server.device.profile.heartbeat):
-                    self._write(events.part(text or "Heartbeat"))
-        finally:
-            self.server.device.events.leave(subscription)
+        with closing(chunks):
+            for chunk in chunks:
+                self._write(chunk)
 
     def _challenge(self, verdict: Verdict, entry: dict[str, Any]) -> None:
         entry["status"] = 401

@@ -1,4 +1,4 @@
-"""Starts one simulated camera: its two ports, and its end. Its settings are in `settings`."""
+"""Starts one simulated camera: its ports, and its end. Its settings are in `settings`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from socketserver import BaseServer
 from threading import Thread
 
 from services.errors import ConfigError
+from services.simulators.camera import rtsp
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, realm
 from services.simulators.camera.http import CameraServer
@@ -22,6 +23,7 @@ from services.simulators.camera.view.picture import Pictures
 from services.simulators.camera.view.scene import Scene
 from services.simulators.world import load
 
+WATCH_S = 0.1  # between two looks of the motion detection
 POLL_S = 0.1  # how long a port may take to notice that it is to close
 
 
@@ -47,7 +49,8 @@ class Simulated:
     @property
     def addresses(self) -> dict[str, str | int]:
         """What a program that attaches wants to know."""
-        return {"url": self.url, "port": self.port, "side_door_port": self.side_door_port}
+        ports = {"port": self.port, "side_door_port": self.side_door_port}
+        return {"url": self.url, **ports, **({} if self.rtsp_port is None else {"rtsp_port": self.rtsp_port})}
 
     @property
     def side_door_url(self) -> str:
@@ -63,11 +66,17 @@ def start(config: Config, *, clock: Callable[[], float] = time.time) -> Iterator
         stack.callback(server.server_close)
         stack.callback(server.switch_off)
         stack.enter_context(_served(server))
+        stack.enter_context(_watching(server))
         side = SideDoor(("127.0.0.1", config.side_door_port), server)
         stack.callback(side.server_close)
         stack.enter_context(_served(side))
-        port = server.server_address[1]
-        yield Simulated(f"http://{config.host}:{port}", port, side.server_address[1], None, server)
+        port, live = server.server_address[1], stack.enter_context(rtsp.served(server, config.rtsp_port))
+        if live is not None:
+            server.device.tables.fix("RTSP.Port", str(live.port))
+        rtsp_port = live.port if live else None
+        if server.onvif is not None:
+            server.onvif.rtsp_port = rtsp_port
+        yield Simulated(f"http://{config.host}:{port}", port, side.server_address[1], rtsp_port, server)
 
 
 def inside(config: Config, now: float) -> Inside:
@@ -89,6 +98,23 @@ def _server(config: Config, clock: Callable[[], float]) -> CameraServer:
     if behind.device.profile.onvif:
         server.onvif = Onvif(behind.device, config.user, config.password.get_secret_value())
     return server
+
+
+@contextmanager
+def _watching(server: CameraServer) -> Iterator[None]:
+    """Looks for motion while the camera runs."""
+
+    def watch() -> None:
+        while not server.closing.wait(WATCH_S):
+            server.device.watch(server.clock())
+
+    thread = Thread(target=watch, name="motion detection")
+    thread.start()
+    try:
+        yield
+    finally:
+        server.closing.set()
+        thread.join()
 
 
 @contextmanager

@@ -22,10 +22,12 @@ class Config(Section):
     host: str = "127.0.0.1"
     port: int = Field(default=0, ge=0, le=65535)
     side_door_port: int = Field(default=0, ge=0, le=65535)
+    rtsp_port: int | None = Field(default=0, ge=0, le=65535)  # None: no RTSP
     user: str = "ros"
     password: SecretStr = SecretStr("")
     profile: str = "ip3m-941w-2019"
-    switches: Profile = Field(default_factory=dict, validate_default=True)  # those of the profile that are others
+    # The whole firmware: what the file changes, on top of the profile with that name.
+    switches: Profile = Field(default_factory=dict, validate_default=True)
     latency_s: float | None = Field(default=None, ge=0)  # of each request; None: the profile's
     seed: int = 1  # of textures, noise and nonces
 

@@ -59,9 +59,10 @@ def test_none_is_taken_of_a_camera_that_is_away_or_turns(state: Any, moving: boo
 
 
 @pytest.mark.parametrize("wanted", [True, False])
-def test_motion_brings_a_snapshot_where_it_is_configured(wanted: bool) -> None:
-    plan = feed([], at_motion=wanted).at_motion()
-    assert next(plan, None) == (Snapshot() if wanted else None)
+def test_motion_brings_a_snapshot_when_it_begins_where_that_is_configured(wanted: bool) -> None:
+    here = feed([], at_motion=wanted)
+    asked = [next(here.at_motion(value), None) is not None for value in (0, 1, 1, 0, 1, -1, 1)]
+    assert asked == [wanted and rising for rising in (False, True, False, False, True, False, True)]
 
 
 def test_snapshots_are_upright() -> None:

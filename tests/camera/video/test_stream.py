@@ -133,8 +133,12 @@ def test_a_stream_that_stands_still_is_told_within_10_s_and_comes_back(here: Ben
     rtsp.tell("freeze")
     here.until(lambda: "stream: no picture" in diagnostic(here)["message"], 10)
     assert diagnostic(here)["level"] == 1
+    here.until(lambda: here.payloads("status")[-1]["state"] == "degraded", 2)
+    here.order("Zoom", "0", "2")
+    assert here.end_of("2", 20)["state"] == "done"  # it can be used all the same
     rtsp.tell("go")
     here.until(lambda: diagnostic(here)["message"] == "online", 60)
+    here.until(lambda: here.payloads("status")[-1]["state"] == "online", 2)
 
 
 @pytest.mark.rtsp
@@ -220,5 +224,6 @@ def test_a_port_that_is_taken_costs_the_stream_alone(tmp_path: Path, camera: sim
             assert stream(here)["url"] == ""
             here.order("RTSP", "ON", "1")
             assert here.end_of("1", 5)["state"] == "refused"
+            here.until(lambda: bool(here.payloads("position")), 10)
             here.order("Zoom", "0", "2")
-            assert here.end_of("2", 20)["state"] == "done"
+            assert here.end_of("2", 20)["state"] == "done", here.end_of("2", 1)["error"]

@@ -9,8 +9,9 @@ import re
 from collections.abc import Generator
 from datetime import datetime
 
-from services.camera.brands.dahua import events
+from services.camera.brands.dahua import capabilities, events
 from services.camera.brands.dahua.replies import is_ok, read_table
+from services.camera.capabilities import GetCapabilities
 from services.camera.errands import (
     GetClock,
     GetContrast,
@@ -51,6 +52,8 @@ def dialogue(errand: Errand) -> Dialogue:
             return _set_contrast(values)
         case GetStorage():
             return _storage()
+        case GetCapabilities(part):
+            return capabilities.detect(part)
     raise Refused(f"this brand knows no {type(errand).__name__}")
 
 

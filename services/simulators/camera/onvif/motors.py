@@ -13,11 +13,12 @@ from xml.etree.ElementTree import Element
 from xml.sax.saxutils import escape
 
 from services.simulators.camera.device import Device
-from services.simulators.camera.motors import CODES, ZOOM_MAX, Pose
+from services.simulators.camera.motors import CODES, ZOOM_MAX, Axes, Pose
 from services.simulators.camera.onvif.soap import Fault, tag, text
 
 PROFILE, CONFIGURATION, NODE = "MediaProfile000", "PTZ000", "PTZNODE000"
 SPACES = "http://www.onvif.org/ver10/tptz"
+TOP = 8  # a speed of 1 is the fastest of the CGI side's levels
 DEFAULT_S = 10.0  # a continuous move without a timeout
 DURATION = re.compile(r"PT(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?")
 OFFERED = (  # the kinds of spaces, and whether they have two axes
@@ -33,13 +34,6 @@ class PtzService:
 
     def __init__(self, device: Device) -> None:
         self._device, self._ptz = device, device.ptz
-        self._until = float("inf")  # when a motion that nobody stops ends by itself
-
-    def expire(self, now: float) -> None:
-        """Ends a motion whose timeout is over."""
-        if now >= self._until:
-            self._ptz.motors.halt(now)
-            self._until = float("inf")
 
     def node(self, asked: Element, now: float) -> str:
         """The one node, and the bounds of its spaces."""
@@ -73,11 +67,13 @@ class PtzService:
             return self.stop(asked, now)
         signs = (_sign(x), _sign(y), 0) if x or y else (0, 0, _sign(z))
         code = next(code for code, axes in CODES.items() if axes == signs)
-        pan, tilt = (min(8, max(1, round(8 * abs(value)))) for value in (x, y))
         inverts, tables = self._device.profile.mirror_inverts_motors, self._device.tables
-        flip, mirror = (inverts and tables.flag(f"VideoInOptions[0].{key}") for key in ("Flip", "Mirror"))
-        self._ptz.motors.start(code, tilt, pan if x else tilt, now, flip=flip, mirror=mirror)
-        self._until = now + seconds(text(asked, "Timeout"))
+        flip, mirror = (-1 if inverts and tables.flag(f"VideoInOptions[0].{key}") else 1 for key in ("Flip", "Mirror"))
+        levels = (max(1, round(TOP * abs(value))) for value in (x, y, z))
+        ways = (mirror * signs[0], flip * signs[1], signs[2])
+        motors = self._ptz.motors
+        speeds = (way * rail.speed(level) for way, rail, level in zip(ways, motors.rails, levels, strict=True))
+        motors.turn(code, Axes(*speeds), now, seconds(text(asked, "Timeout")))
         return ""
 
     def absolute(self, asked: Element, now: float) -> str:
@@ -94,7 +90,6 @@ class PtzService:
     def stop(self, asked: Element, now: float) -> str:
         """Ends every motion, of whatever kind."""
         self._ptz.motors.halt(now)
-        self._until = float("inf")
         return ""
 
     def presets(self, asked: Element, now: float) -> str:
@@ -128,7 +123,6 @@ class PtzService:
         return ""
 
     def _go(self, pose: Pose, now: float) -> None:
-        self._until = float("inf")
         self._ptz.motors.go(pose, now)
 
     def _number(self, asked: Element) -> int:

@@ -25,13 +25,18 @@ class Onvif:
 
     def __init__(self, device: Device, user: str, password: str) -> None:
         self._device, self._signatures = device, Signatures(user, password)
-        self._motors = motors = PtzService(device)
+        motors = PtzService(device)
+        self.rtsp_port: int | None = None  # where the stream is, once that runs
         self._host = ""  # as the client calls it: for the addresses that are told
         device_service: dict[str, Operation] = {
             "GetSystemDateAndTime": self._time, "GetServices": self._services, "GetCapabilities": self._capabilities,
             "GetDeviceInformation": self._information, "SystemReboot": self._reboot,
         }  # fmt: skip
-        media: dict[str, Operation] = {"GetProfiles": self._profiles, "GetSnapshotUri": self._snapshot_uri}
+        media: dict[str, Operation] = {
+            "GetProfiles": self._profiles,
+            "GetSnapshotUri": self._snapshot_uri,
+            "GetStreamUri": self._stream_uri,
+        }
         ptz: dict[str, Operation] = {
             "GetNodes": motors.node, "GetNode": motors.node, "GetStatus": motors.status, "Stop": motors.stop,
             "ContinuousMove": motors.continuous, "AbsoluteMove": motors.absolute, "GetPresets": motors.presets,
@@ -51,7 +56,6 @@ class Onvif:
             asked = message.find(f"{{{SOAP}}}Body/*")
             if asked is None:
                 raise Fault("Well-formed Error", "env:Sender", "ter:WellFormed")
-            self._motors.expire(now)
             return framed(self._act(message, asked, now))
         except ElementTree.ParseError:
             return refused(Fault("Well-formed Error", "env:Sender", "ter:WellFormed"))
@@ -117,10 +121,23 @@ class Onvif:
         inner += tag("tt:PTZConfiguration", motors, token=CONFIGURATION)
         return tag("trt:Profiles", inner, token=PROFILE, fixed="true")
 
+    def _stream_uri(self, asked: Element, now: float) -> str:
+        host = self._host.rpartition(":")[0] or self._host
+        port = self.rtsp_port
+        if port is None:
+            raise Fault("No stream", "env:Receiver", "ter:Action", "ter:IncompleteConfiguration")
+        inner = tag(
+            "tt:Uri", escape(f"rtsp://{host}:{port}/cam/realmonitor?channel=1&subtype=0&unicast=true&proto=Onvif")
+        )
+        return tag("trt:MediaUri", inner + self._validity())
+
+    @staticmethod
+    def _validity() -> str:
+        never = tag("tt:InvalidAfterConnect", "false") + tag("tt:InvalidAfterReboot", "false")
+        return never + tag("tt:Timeout", "PT0S")
+
     def _snapshot_uri(self, asked: Element, now: float) -> str:
-        inner = tag("tt:Uri", self._at("/cgi-bin/snapshot.cgi?channel=1"))
-        inner += tag("tt:InvalidAfterConnect", "false") + tag("tt:InvalidAfterReboot", "false")
-        return tag("trt:MediaUri", inner + tag("tt:Timeout", "PT0S"))
+        return tag("trt:MediaUri", tag("tt:Uri", self._at("/cgi-bin/snapshot.cgi?channel=1")) + self._validity())
 
     def _at(self, path: str) -> str:
         return escape(f"http://{self._host}{path}")

@@ -1,0 +1,331 @@
+"""Every order that a camera takes, given with the public clients of both worlds; its effect is seen in the camera."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import yaml
+
+from services import peers
+from services.client import FINAL, Client
+from services.payloads import OrderResult
+from tests.camera.trials import apart
+from tests.small_flat import Door, SmallFlat, small_flat
+
+pytestmark = [pytest.mark.mosquitto, pytest.mark.ros]
+SIMULATOR = {"latency_s": 0.05, "switches": {"boot_s": 3.0}}
+CAMERA = {"frames": 1, "discovery": True}
+HOWS = ("mosquitto_pub", "rostopic pub")
+
+
+@dataclass
+class Here:
+    """The apartment, a client that hears everything of the camera, and how orders are given."""
+
+    flat: SmallFlat
+    bus: Client
+    how: str
+    processes: list[subprocess.Popen[bytes]]
+
+    @property
+    def door(self) -> Door:
+        """What is true of the camera."""
+        return self.flat.doors["ip1"]
+
+    def give(self, key: str, value: str) -> None:
+        """Gives an order as a person would."""
+        if self.how == "mosquitto_pub":
+            topic = "camera/ip1/position/set" if key == "Position" else f"camera/ip1/order/{key}"
+            self._run("mosquitto_pub", "-p", str(self.flat.broker.port), "-t", topic, "-m", value)
+        elif key == "Position":
+            axes = json.loads(value)
+            point = {"x": axes["pan"], "y": axes["tilt"], "z": axes["zoom"]}
+            self._run("rostopic", "pub", "-1", "/ip_camera_position", "geometry_msgs/Point", json.dumps(point))
+        else:
+            pair = json.dumps({"key": key, "value": value})
+            self._run("rostopic", "pub", "-1", "/ip_camera_order", "diagnostic_msgs/KeyValue", pair)
+
+    def order(self, key: str, value: str, limit_s: float = 40.0) -> list[OrderResult]:
+        """Gives it, and returns its answers once there is one that ends it."""
+        self.bus.forget()
+        self.give(key, value)
+        wanted = json.loads(value) if value.startswith("{") else value
+        answers: list[OrderResult] = []
+
+        def ended(result: OrderResult) -> bool:
+            answers.extend([result] if (result.key, result.value) == (key, wanted) else [])
+            return bool(answers) and answers[-1].state in FINAL
+
+        self.bus.payload("camera/ip1/order_result", ended, limit_s)
+        return answers
+
+    def at(self, **axes: float) -> None:
+        """Puts the camera there, and waits until the service has seen it."""
+        self.door.tell("pose", **axes)
+        wanted = axes.get("pan", self.door.state()["reading"]["pan"])
+
+        def seen() -> bool:
+            position = self.said("position")
+            return apart(position["pan"], wanted) < 0.5 and not position["moving"]
+
+        self.until(seen, "the position")
+
+    def said(self, topic: str) -> Any:
+        """The newest payload there; it waits for the first."""
+        self.bus.pump()
+        return json.loads(self.bytes(topic))
+
+    def retained(self, topic: str) -> Any:
+        """What someone who comes now is told."""
+        with self.flat.client(f"camera/ip1/{topic}") as newcomer:
+            return json.loads(newcomer.until(lambda message: message.retain, 10.0, topic).payload)
+
+    def bytes(self, topic: str) -> bytes:
+        """The same as bytes."""
+        name = f"camera/ip1/{topic}"
+        self.bus.until(lambda message: message.topic == name, 20.0, name)
+        return [message.payload for message in self.bus.seen if message.topic == name][-1]
+
+    def until(self, happened: Callable[[], bool], what: str) -> None:
+        """Waits for it."""
+        peers.wait_until(happened, what, 15.0)
+
+    def _run(self, program: str, *words: str) -> None:
+        """Starts it; `rostopic pub -1` says its word at once and stays for 3 s more."""
+        environment = {**os.environ, **(self.flat.ros.env if self.flat.ros else {})}
+        command = [peers.program(program, program), *words]
+        with (self.flat.folder / "clients.log").open("ab") as log:
+            self.processes.append(subprocess.Popen(command, env=environment, stdout=log, stderr=log))
+
+
+@pytest.fixture(scope="module")
+def flat(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SmallFlat]:
+    try:
+        with small_flat(tmp_path_factory.mktemp("flat"), simulator=SIMULATOR, camera=CAMERA, with_ros=True) as running:
+            yield running
+    except peers.Missing as missing:
+        pytest.skip(str(missing))
+
+
+@pytest.fixture(scope="module")
+def clients(flat: SmallFlat) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """The public clients that were started; all of them end well by themselves."""
+    started: list[subprocess.Popen[bytes]] = []
+    yield started
+    assert [process.wait(20) for process in started] == [0] * len(started), (flat.folder / "clients.log").read_text()
+
+
+@pytest.fixture(params=HOWS)
+def here(request: pytest.FixtureRequest, flat: SmallFlat, clients: list[subprocess.Popen[bytes]]) -> Iterator[Here]:
+    with flat.client("camera/ip1/#") as bus:
+        yield Here(flat, bus, request.param, clients)
+
+
+Step = Callable[[Here], None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One order: what it is given with, what was before, and what must be true of the camera afterwards."""
+
+    key: str
+    value: str
+    effect: Step
+    before: Step = lambda here: None
+    after: Step = lambda here: None
+
+    def __str__(self) -> str:
+        return f"{self.key} {self.value}"[:40]
+
+
+def looks_at(place: str) -> Step:
+    def check(here: Here) -> None:
+        pose, wanted = here.door.state()["pose"], positions(here)[place]
+        assert apart(pose["pan"], wanted[0]) <= 0.5
+        assert abs(pose["tilt"] - wanted[1]) <= 0.5
+        assert not here.door.moving
+
+    return check
+
+
+def positions(here: Here) -> dict[str, list[float]]:
+    file: Path = here.flat.folder / "config" / "ip1" / "preset_position.yaml"
+    found: dict[str, list[float]] = yaml.safe_load(file.read_text())
+    return found
+
+
+def presets(here: Here) -> set[str]:
+    return set(here.door.state()["presets"])
+
+
+def stands_at(pan: float, tilt: float) -> Step:
+    return lambda here: here.at(pan=pan, tilt=tilt, zoom=0.0)
+
+
+def turned(here: Here) -> None:
+    pose = here.door.state()["pose"]
+    assert apart(pose["pan"], 60.0) > 1.0
+    assert abs(pose["tilt"] - 20.0) < 0.2
+    assert not here.door.moving
+
+
+def turning(here: Here) -> None:
+    stands_at(60.0, 20.0)(here)
+    here.give("Move", "Right 2 20")
+    here.until(lambda: here.door.moving, "the camera to turn")
+
+
+def still(here: Here) -> None:
+    assert not here.door.moving
+
+
+def zoomed(level: float | None) -> Step:
+    def check(here: Here) -> None:
+        zoom = here.door.state()["pose"]["zoom"]
+        assert zoom > 0.5 if level is None else abs(zoom - level) <= 0.5
+        assert not here.door.moving
+
+    return check
+
+
+def is_saved(here: Here) -> None:
+    assert positions(here)["Näher: 1"][0] == pytest.approx(60.0, abs=0.2)
+    assert len(presets(here)) == 10
+    here.until(lambda: "Näher: 1" in here.retained("places"), "the place")
+
+
+def is_removed(here: Here) -> None:
+    assert "Näher: 1" not in positions(here)
+    assert len(presets(here)) == 9
+    here.until(lambda: "Näher: 1" not in here.retained("places"), "the place to be gone")
+
+
+def save(here: Here) -> None:
+    stands_at(60.0, 20.0)(here)
+    here.order("SaveAs", "Näher: 1")
+
+
+def remove(here: Here) -> None:
+    here.order("Remove", "Näher: 1")
+
+
+def option(key: str, value: str, table: str = "VideoInOptions") -> Step:
+    def check(here: Here) -> None:
+        assert here.flat.table("ip1", table)[key] == value
+
+    return check
+
+
+def ordered(key: str, value: str) -> Step:
+    def give(here: Here) -> None:
+        assert here.order(key, value)[-1].state == "done"
+
+    return give
+
+
+ONE_PLACE = '{"targets": [582], "places": ["Living room"]}'
+
+
+def found(here: Here) -> None:
+    result = here.said("scan/result")
+    assert (result["marker"], result["place"]) == (582, "Living room")
+    assert here.said("scan/state")["state"] == "done"
+    assert apart(here.door.state()["pose"]["pan"], positions(here)["Living room"][0]) <= 0.5
+
+
+def scanning(here: Here) -> None:
+    here.give("Scan", "True")
+    here.until(lambda: here.said("scan/state")["state"] == "running", "the scan")
+
+
+def cancelled(here: Here) -> None:
+    assert here.said("scan/state")["state"] == "cancelled"
+    assert not here.door.moving
+
+
+def shown(here: Here) -> None:
+    assert here.order("Scan", ONE_PLACE)[-1].state == "done"
+    assert here.bytes("scan/image").startswith(b"\xff\xd8")
+
+
+def looks_for(*targets: int) -> Step:
+    def check(here: Here) -> None:
+        scanning(here)
+        assert here.said("scan/state")["targets"] == list(targets)
+        ordered("Scan", "False")(here)
+
+    return check
+
+
+def visits(place: str) -> Step:
+    def check(here: Here) -> None:
+        here.bus.forget()
+        here.give("Scan", "True")
+        here.until(lambda: here.said("scan/state")["place"] == place, place)
+        ordered("Scan", "False")(here)
+
+    return check
+
+
+def streams(here: Here) -> None:
+    here.until(lambda: here.said("stream")["mjpeg"], "the stream to be on")
+    with httpx.stream("GET", here.said("stream")["url"], timeout=20.0) as answer:
+        assert answer.headers["content-type"].startswith("multipart/x-mixed-replace")
+        piece = next(piece for piece in answer.iter_bytes(4096) if b"\xff\xd8" in piece)
+    assert b"image/jpeg" in piece
+
+
+def rebooted(here: Here) -> None:
+    assert any("action=reboot" in entry["target"] for entry in here.door.log())
+    assert not here.door.state()["booting"]
+    here.until(lambda: here.said("status")["state"] == "online", "the camera to be back")
+
+
+CASES = (
+    Case("Goto", "Kitchen", looks_at("Kitchen"), stands_at(60.0, 20.0)),
+    Case(
+        "Position", '{"pan": 70.0, "tilt": 25.0, "zoom": 0.0}', lambda here: near(here, 70.0, 25.0), stands_at(60, 20)
+    ),
+    Case("SaveAs", "Näher: 1", is_saved, stands_at(60.0, 20.0), remove),
+    Case("Remove", "Näher: 1", is_removed, save),
+    Case("Move", "Left 3 0.5", turned, stands_at(60.0, 20.0)),
+    Case("Move", "Stop", still, turning),
+    Case("Zoom", "In", zoomed(None), stands_at(60.0, 20.0)),
+    Case("Zoom", "4", zoomed(4.0), stands_at(60.0, 20.0)),
+    Case("MJPEG", "ON", streams, after=ordered("MJPEG", "OFF")),
+    Case("Mirror", "False", option("VideoInOptions[0].Mirror", "false"), after=ordered("Mirror", "True")),
+    Case("Flip", "0", option("VideoInOptions[0].Flip", "false"), after=ordered("Flip", "1")),
+    Case("VideoMode", "bw", option("VideoInOptions[0].DayNightColor", "2"), after=ordered("VideoMode", "color")),
+    Case("Scan", ONE_PLACE, found),
+    Case("Scan", "False", cancelled, scanning),
+    Case("ScanImgPub", "ON", shown, after=ordered("ScanImgPub", "OFF")),
+    Case("SetTarget", "582,17", looks_for(582, 17), after=ordered("SetTarget", "582")),
+    Case("AddTarget", "100", looks_for(582, 100), after=ordered("SetTarget", "582")),
+    Case("RemoveTarget", "582", looks_for(17), ordered("SetTarget", "582,17"), ordered("SetTarget", "582")),
+    Case("SetRoutine", "Desk,Hall", visits("Desk"), after=ordered("SetRoutine", "auto")),
+    Case("Reboot", "True", rebooted),
+)
+
+
+def near(here: Here, pan: float, tilt: float) -> None:
+    pose = here.door.state()["pose"]
+    assert apart(pose["pan"], pan) <= 0.5
+    assert abs(pose["tilt"] - tilt) <= 0.5
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_an_order_does_what_it_says_and_is_answered_step_by_step(case: Case, here: Here) -> None:
+    case.before(here)
+    answers = here.order(case.key, case.value)
+    assert [answer.state for answer in answers] == ["accepted", "running", "done"], answers[-1].error
+    assert len({answer.id for answer in answers}) == 1
+    case.effect(here)
+    case.after(here)
