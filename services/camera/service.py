@@ -269,6 +269,8 @@ class CameraService:
     def _motor_plan(self, command: Command, now: float) -> Plan[object]:
         if isinstance(command, ScanFor):
             return self.scanner.plan(command, now)
+        if isinstance(command, orders.Calibrate):
+            return self.errands.calibrate()
         assert isinstance(command, GotoPlace | LookAt)
         return self.errands.plan(command, now)
 
