@@ -78,6 +78,7 @@ class CameraService:
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
         self.errands = Errands(config, self.bulletin, self.places)
+        self.motors.skill = self.errands.skill
         self.scanner = Scanner(config, self.errands.skill, eye, analyst, self.bulletin, self.places)
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
