@@ -106,6 +106,13 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
         20,
         "s until the stop arrives",
     ),
+    "camera-faults": (
+        lambda: cameras(
+            lambda flat, rng: camera_trials.fault(flat, rng.choice(camera_trials.FAULTS)), **camera_trials.FAULTY
+        ),
+        25,
+        "s until it shows",
+    ),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
 }

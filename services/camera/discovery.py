@@ -110,11 +110,13 @@ def _buttons(camera: str) -> dict[Key, dict[str, Any]]:
 
 
 def _switches(camera: str) -> dict[Key, dict[str, Any]]:
-    """What can be told back has a state; of privacy the camera's own word is not on the bus, so it is assumed."""
+    """They show what the camera says, not what was wished."""
     stream = topics.CAMERA_STREAM.name(cam=camera)
     mjpeg = {"name": "MJPEG stream", "command_topic": _order(camera, "MJPEG"), "state_topic": stream,
              "value_template": "{{ 'ON' if value_json.mjpeg else 'OFF' }}"}  # fmt: skip
-    privacy = {"name": "Privacy", "command_topic": _order(camera, "Privacy"), "icon": "mdi:eye-off"}
+    privacy = {"name": "Privacy", "command_topic": _order(camera, "Privacy"), "icon": "mdi:eye-off",
+               "state_topic": topics.DIAGNOSTICS.name(component=f"camera/{camera}"),
+               "value_template": "{{ 'ON' if value_json['values']['privacy'] == 'on' else 'OFF' }}"}  # fmt: skip
     return {
         ("switch", "mjpeg"): {**mjpeg, "payload_on": "ON", "payload_off": "OFF"},
         ("switch", "privacy"): {**privacy, "payload_on": "ON", "payload_off": "OFF"},

@@ -11,26 +11,24 @@ from tests.camera import trials
 from tests.small_flat import SmallFlat, small_flat
 
 pytestmark = pytest.mark.mosquitto
-SIMULATOR = {"latency_s": 0.1, "switches": {"boot_s": 4.0}}
-CAMERA = {"login_retry_s": 5.0, "stream": {"rtsp": True}}
 
 
 @pytest.fixture(scope="module")
 def flat(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SmallFlat]:
     try:
-        with small_flat(tmp_path_factory.mktemp("flat"), simulator=SIMULATOR, camera=CAMERA) as running:
+        with small_flat(tmp_path_factory.mktemp("flat"), **trials.FAULTY) as running:
             yield running
     except peers.Missing as missing:
         pytest.skip(str(missing))
 
 
+def test_after_a_change_of_the_password_at_most_three_logins_fail(flat: SmallFlat) -> None:
+    assert 1 <= trials.change_password(flat) <= 3
+
+
 @pytest.mark.parametrize("fault", trials.FAULTS, ids=str)
 def test_a_fault_shows_within_fifteen_seconds_and_leaves_nothing_behind(flat: SmallFlat, fault: trials.Fault) -> None:
     assert trials.fault(flat, fault) < trials.NOTICED_S
-
-
-def test_after_a_change_of_the_password_at_most_three_logins_fail(flat: SmallFlat) -> None:
-    assert 1 <= trials.change_password(flat) <= 3
 
 
 def test_an_idle_camera_is_asked_less_than_twice_a_second(flat: SmallFlat) -> None:

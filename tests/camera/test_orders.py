@@ -15,6 +15,7 @@ import httpx
 import numpy as np
 import pytest
 import yaml
+from jinja2 import Environment
 
 from services import peers
 from services.camera import orders
@@ -46,8 +47,7 @@ class Here:
     def give(self, key: str, value: str) -> None:
         """Gives an order as a person would."""
         if self.how == "mosquitto_pub":
-            topic = "camera/ip1/position/set" if key == "Position" else f"camera/ip1/order/{key}"
-            self._run("mosquitto_pub", "-p", str(self.flat.broker.port), "-t", topic, "-m", value)
+            self.publish("camera/ip1/position/set" if key == "Position" else f"camera/ip1/order/{key}", value)
         elif key == "Position":
             axes = json.loads(value)
             point = {"x": axes["pan"], "y": axes["tilt"], "z": axes["zoom"]}
@@ -55,6 +55,10 @@ class Here:
         else:
             pair = json.dumps({"key": key, "value": value})
             self._run("rostopic", "pub", "-1", "/ip_camera_order", "diagnostic_msgs/KeyValue", pair)
+
+    def publish(self, topic: str, payload: str) -> None:
+        """With mosquitto_pub."""
+        self._run("mosquitto_pub", "-p", str(self.flat.broker.port), "-t", topic, "-m", payload)
 
     def order(self, key: str, value: str, limit_s: float = 40.0) -> list[OrderResult]:
         """Gives it, and returns its answers once there is one that ends it."""
@@ -347,7 +351,7 @@ def rebooted(here: Here) -> None:
 
 
 CASES = (
-    Case("Goto", "Kitchen", looks_at("Kitchen"), stands_at(60.0, 20.0)),
+    Case("Goto", "Kitchen", looks_at("Kitchen"), stands_at(262.0, 22.0)),
     Case(
         "Position", '{"pan": 70.0, "tilt": 25.0, "zoom": 0.0}', lambda here: near(here, 70.0, 25.0), stands_at(60, 20)
     ),
@@ -366,9 +370,9 @@ CASES = (
     Case("AudioPlay", "ding.wav", is_played, a_file),
     Case("VideoMode", "bw", option("VideoInOptions[0].DayNightColor", "2"), after=ordered("VideoMode", "color")),
     Case("VideoMode", "scan", high_contrast, after=usual_contrast),
-    Case("Scan", ONE_PLACE, found),
+    Case("Scan", ONE_PLACE, found, stands_at(320.0, 36.0)),
     Case("Scan", "False", cancelled, scanning),
-    Case("ScanImgPub", "ON", shown, after=ordered("ScanImgPub", "OFF")),
+    Case("ScanImgPub", "ON", shown, stands_at(320.0, 36.0), ordered("ScanImgPub", "OFF")),
     Case("SetTarget", "582,17", looks_for(582, 17), after=ordered("SetTarget", "582")),
     Case("AddTarget", "100", looks_for(582, 100), after=ordered("SetTarget", "582")),
     Case("RemoveTarget", "582", looks_for(17), ordered("SetTarget", "582,17"), ordered("SetTarget", "582")),
@@ -395,3 +399,61 @@ def test_an_order_does_what_it_says_and_is_answered_step_by_step(case: Case, her
 
 def test_every_order_is_in_the_table() -> None:
     assert {case.key for case in CASES} == {name for name, _ in orders.KEYS.values()} | {"Position"}
+
+
+@pytest.fixture
+def panel(flat: SmallFlat, clients: list[subprocess.Popen[bytes]]) -> Iterator[Panel]:
+    with flat.client("camera/ip1/#", "homeassistant/#") as bus:
+        yield Panel(Here(flat, bus, "mosquitto_pub", clients))
+
+
+class Panel:
+    """Home Assistant, as far as it publishes: what it was told of an entity decides topic and payload."""
+
+    def __init__(self, here: Here) -> None:
+        self.here = here
+
+    def entity(self, kind: str) -> dict[str, Any]:
+        topic = f"homeassistant/{kind.replace('.', '/ip1/')}/config"
+        found: dict[str, Any] = json.loads(self.here.bus.until(lambda one: one.topic == topic, 10.0, topic).payload)
+        return found
+
+    def press(self, kind: str, value: str) -> None:
+        """Publishes what Home Assistant would for this value (an option, or the entity's own word for it)."""
+        entity = self.entity(kind)
+        word = entity.get(value, value)
+        payload = Environment().from_string(entity.get("command_template", "{{ value }}")).render(value=word)
+        self.here.publish(entity["command_topic"], payload)
+
+    def ends(self, key: str, state: str) -> None:
+        """Waits for the end of an order that is not older than the last `forget`."""
+        self.here.bus.payload(
+            "camera/ip1/order_result", lambda result: (result.key, result.state) == (key, state), 40.0
+        )
+
+
+def test_what_home_assistant_sends_is_carried_out(panel: Panel) -> None:
+    here = panel.here
+    assert set(panel.entity("select.place")["options"]) == set(positions(here))
+    panel.press("select.place", "Desk")
+    panel.ends("Goto", "done")
+    looks_at("Desk")(here)
+    panel.press("switch.privacy", "payload_on")
+    panel.ends("Privacy", "done")
+    assert here.flat.table("ip1", "LeLensMask")["LeLensMask[0].Enable"] == "true"
+    here.bus.seen[:] = [one for one in here.bus.seen if one.topic.startswith("homeassistant/")]
+    panel.press("switch.privacy", "payload_off")
+    panel.ends("Privacy", "done")
+    panel.press("switch.mjpeg", "payload_on")
+    panel.ends("MJPEG", "done")
+    here.until(lambda: here.retained("stream")["mjpeg"], "the stream")
+    panel.press("switch.mjpeg", "payload_off")
+    panel.press("button.take_snapshot", "payload_press")
+    topic = panel.entity("camera.snapshot")["topic"]
+    assert here.bus.until(lambda one: one.topic == topic, 20.0, topic).payload.startswith(b"\xff\xd8")
+    panel.press("button.scan", "payload_press")
+    here.until(lambda: here.said("scan/state")["state"] == "running", "the scan")
+    panel.press("button.stop", "payload_press")
+    panel.ends("Scan", "cancelled")
+    panel.ends("Move", "done")
+    assert not here.door.moving

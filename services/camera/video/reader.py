@@ -20,7 +20,7 @@ from services.camera.video.timing import Exposure, StreamClock
 from services.errors import DeviceError
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0
-LONGEST_LOGIN_S = 1800.0  # each attempt may lock the account
+MARGIN_S = 0.5  # so that the gate is open when it is asked again
 PATIENCE = 2  # failures of the best way before another one is tried
 BETTER_S = 300.0  # so long a worse way is used before the best one is tried again
 HOPELESS_S = 5.0  # a lag that a new connection takes away
@@ -150,10 +150,9 @@ class Reader:
         self.flow.name, self.flow.trouble, self.flow.queueing = "", str(error), False
 
     def _pause(self, error: DeviceError) -> None:
-        first, longest = FIRST_PAUSE_S, LONGEST_PAUSE_S
-        if isinstance(error, BadLogin):
-            first, longest = max(error.again_s, self.login_retry_s), LONGEST_LOGIN_S
-        pause = min(longest, first * 2 ** min(self.flow.failures - 1, 10))
+        pause = min(LONGEST_PAUSE_S, FIRST_PAUSE_S * 2 ** min(self.flow.failures - 1, 10))
+        if isinstance(error, BadLogin):  # the gate decides who may try when; asking it while it is closed costs nothing
+            pause = min(error.again_s or self.login_retry_s, self.login_retry_s) + MARGIN_S
         with self._changed:
             before = self._ways
             self._changed.wait_for(lambda: self._closing or self._ways is not before, pause)
