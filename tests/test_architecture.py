@@ -96,7 +96,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),
     "typer": ("services.__main__",),
-    "rich": ("services.__main__", "services.demo", "services.camera.probe."),
+    "rich": ("services.__main__", "services.camera.ptz.command", "services.demo", "services.camera.probe."),
     "starlette": ("services.dashboard.http",),
     "uvicorn": ("services.dashboard.http",),
     "pytest": ("services.pytest_plugin",),
@@ -106,9 +106,25 @@ DOORS: dict[str, tuple[str, ...]] = {
 }
 
 # Pure: what decides has no clock and does no input or output.
+MOVING = (
+    "calibrate",
+    "course",
+    "drive",
+    "driving",
+    "goal",
+    "helm",
+    "leg",
+    "move",
+    "pace",
+    "skill",
+    "stand",
+    "turning",
+    "zooming",
+)
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
-    "services.bus", "services.vision.", "services.camera.ptz.move", "services.camera.scan.search",
+    "services.bus", "services.vision.", *(f"services.camera.ptz.{part}" for part in MOVING),
+    "services.camera.scan.search",
     "services.camera.video.timing",
     "services.camera.brands.dahua.", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules",

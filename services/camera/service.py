@@ -78,6 +78,7 @@ class CameraService:
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
         self.errands = Errands(config, self.bulletin, self.places)
+        self.motors.skill = self.errands.skill
         self.scanner = Scanner(config, self.errands.skill, eye, analyst, self.bulletin, self.places)
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
@@ -269,6 +270,8 @@ class CameraService:
     def _motor_plan(self, command: Command, now: float) -> Plan[object]:
         if isinstance(command, ScanFor):
             return self.scanner.plan(command, now)
+        if isinstance(command, orders.Calibrate):
+            return self.errands.calibrate()
         assert isinstance(command, GotoPlace | LookAt)
         return self.errands.plan(command, now)
 
