@@ -53,7 +53,8 @@ class Quiet:
             threading.Timer(1.0, self.move).start()
 
     def move(self) -> None:
-        httpx.post(f"{self.camera.side_door_url}/event", json={"code": "VideoMotion", "action": "Start"})
+        for action in ("Start", "Stop"):
+            httpx.post(f"{self.camera.side_door_url}/event", json={"code": "VideoMotion", "action": action})
 
     def detail(self, text: str) -> None:
         pass
@@ -226,6 +227,13 @@ def test_its_profile_makes_a_simulated_camera_of_the_same_ways(meetings: dict[st
         if true.preset_max <= 9:
             same.discard("unset_preset")
         assert {key: getattr(again, key) for key in same} == {key: getattr(true, key) for key in same}
+
+
+@pytest.mark.parametrize(("tail", "blank"), [(b"", 0), (b"\r\n", 1), (b"\r\n\r\n", 2)], ids=["none", "one", "two"])
+@pytest.mark.parametrize("part", [b"Heartbeat", b"Code=VideoMotion;action=Start;index=0;data={\n}\n"])
+def test_blank_lines_between_parts_are_counted(part: bytes, tail: bytes, blank: int) -> None:
+    whole = b"--myboundary\r\nContent-Length:9\r\n\r\n" + part + b"\r\n\r\n" + tail
+    assert read_events(whole + whole)["event_blank_lines"] == blank
 
 
 def test_names_and_addresses_are_taken_out() -> None:

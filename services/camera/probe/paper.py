@@ -12,7 +12,9 @@ from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
 
 MEASURED = ("latency_s", "snapshot_s", "tilt_share")
-NOT_SWITCHES = ("event_form", "event_header_twice", "event_length_spaced")  # of no profile yet; they are in the report
+NOT_SWITCHES = (  # of no profile; they are in the report
+    "event_form", "event_header_twice", "event_length_space", "event_blank_lines", "device_class", "lens_mask",
+)  # fmt: skip
 
 
 def section(found: Findings, name: str, user: str) -> str:

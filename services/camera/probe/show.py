@@ -43,6 +43,7 @@ WORDS: dict[str, tuple[str, dict[object, str]]] = {  # switch -> what it is, and
     "continuously": ("Timed moves", {True: "are taken", False: "are refused"}),
     "heartbeat": ("Event stream", {True: "has a heartbeat", False: "is silent when nothing happens"}),
     "event_form": ("Events", {"A": "form A, with data", "B": "form B, without data"}),
+    "event_header_twice": ("Its first answer has", {True: "a second header in its body", False: "one header"}),
     "onvif": ("ONVIF", {True: "yes", False: "no, or switched off"}),
 }  # fmt: skip
 STEPS = len(READS) + 1
