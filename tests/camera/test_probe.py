@@ -9,7 +9,9 @@ import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -180,6 +182,64 @@ def test_nobody_there_is_told_at_once() -> None:
     with pytest.raises(Away, match="nobody answers"):
         contact(wire, Quiet.__new__(Quiet), lambda found: True)
     wire.close()
+
+
+@contextmanager
+def without_cgi(camera: simulated.Simulated) -> Iterator[str]:
+    """The same camera without its own API, as some newer models are: ONVIF and its picture are all there is."""
+
+    class Visit(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+            if "/onvif/" not in self.path and "snapshot" not in self.path:
+                return self.answer(httpx.Response(404))
+            kept = {
+                key: value for key, value in self.headers.items() if key.lower() in ("authorization", "content-type")
+            }
+            return self.answer(httpx.request(self.command, camera.url + self.path, content=body, headers=kept))
+
+        do_POST = do_GET  # noqa: N815 (the base class looks for these names)
+
+        def answer(self, answer: httpx.Response) -> None:
+            self.send_response(answer.status_code)
+            for key in ("www-authenticate", "content-type"):
+                for value in answer.headers.get_list(key):
+                    self.send_header(key, value)
+            self.send_header("Content-Length", str(len(answer.content)))
+            self.end_headers()
+            self.wfile.write(answer.content)
+
+        def log_message(self, format: str, *args: Any) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Visit) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.05,))
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_address[1]}"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def test_a_camera_without_dahuas_api_is_met_over_onvif(tmp_path: Path) -> None:
+    with simulator(latency_s=0) as camera, without_cgi(camera) as url:
+        done = command(tmp_path, "ip9", "--url", url, "--user", "ros", "--yes-move", CAMERA_IP9_PASSWORD=PASSWORD)
+        assert done.returncode == 0, done.stderr
+        assert not [entry for entry in camera.server.log if "action=start" in entry["target"]]
+    assert "IP3M-941W" in done.stdout
+    section = yaml.safe_load((tmp_path / "probe-ip9" / "ip9.yaml").read_text())["cameras"]["ip9"]
+    assert (section["brand"], section["url"]) == ("onvif", url)
+
+
+def test_a_wrong_password_is_tried_once_over_onvif_too() -> None:
+    with simulator(latency_s=0) as camera, without_cgi(camera) as url:
+        wire = Wire(url, "ros", SecretStr("wrong-horse"))
+        with pytest.raises(BadLogin, match="no more will be"):
+            contact(wire, Quiet(camera), lambda found: True)
+        wire.close()
+        tried = [entry for entry in camera.server.log if entry["target"] == "/onvif/device_service"]
+        assert len(tried) == 4  # is there ONVIF, the time, the login, the time again
 
 
 class Interrupted(BaseException):

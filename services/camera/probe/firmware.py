@@ -100,9 +100,14 @@ def latency(wire: Wire, found: Findings) -> None:
         readings.add((reading.pan, reading.tilt))
     found.switches["status_dither"] = len(readings) > 1
     took = [one.seconds for one in wire.exchanges if one.status == 200 and "ptz.cgi" in one.target]
-    found.latency_ms = {"median": _ms(share(took, 0.5)), "p95": _ms(share(took, 0.95)), "worst": _ms(max(took))}
+    found.latency_ms = times(took)
     if words <= {"Moving"}:
         found.switches["move_status"] = "stuck"
+
+
+def times(took: list[float]) -> dict[str, float]:
+    """Seconds as the milliseconds that are shown. Pure."""
+    return {"median": _ms(share(took, 0.5)), "p95": _ms(share(took, 0.95)), "worst": _ms(max(took))}
 
 
 def _ms(seconds: float) -> float:

@@ -21,6 +21,7 @@ def section(found: Findings, name: str, user: str) -> str:
     """The camera's section, as `apartment check` takes it; what could not be found out is a comment."""
     tilt = found.capabilities.get("tilt_range") or [-10, 108]
     channels = found.switches.get("ptz_channels") or ()
+    measured = "as the camera says" if "tilt_range" in found.capabilities else "not told: measure it"
     lines = [
         f"# {' '.join(part for part in (found.vendor, found.model, found.firmware) if part)}".rstrip(),
         "cameras:",
@@ -36,7 +37,7 @@ def section(found: Findings, name: str, user: str) -> str:
         flip, mirror = (str(found.picture[key]).lower() for key in ("flip", "mirror"))
         lines.append(f"    picture: {{flip: {flip}, mirror: {mirror}}}")
     lines += [
-        f"    tilt_range: [{tilt[0]:g}, {tilt[1]:g}]                   # as the camera says",
+        f"    tilt_range: [{tilt[0]:g}, {tilt[1]:g}]                   # {measured}",
         "    pan_dead_arc: [179, 186]                # not measured: what siblings of this camera have",
         f"    places: {name}                             # a folder; it is made when the first place is saved",
         "    # mount, camera_info, markers: see config/apartment.yaml; a scan needs them",

@@ -141,11 +141,12 @@ def report(console: Console, found: Findings) -> None:
     console.print()
     console.print(Panel(_head(found), title="[bold]" + (found.model or "camera") + "[/]", expand=False))
     table = Table("", "how this firmware behaves", box=box.SIMPLE, show_edge=False, pad_edge=False)
-    for switch, (name, _) in WORDS.items():
+    for switch, (name, _) in WORDS.items() if found.brand == "amcrest" else ():
         unsure = switch in found.unknown
         text = f"not found out: {found.unknown[switch]}" if unsure else meaning(switch, found.switches)
         table.add_row(name, Text(text, "dim" if unsure or text == "not found out" else ""))
-    console.print(table)
+    if table.rows:
+        console.print(table)
     if found.speeds:
         console.print(_speeds(found))
     for note in found.notes:
