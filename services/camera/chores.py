@@ -19,6 +19,7 @@ from services.camera.requests import (
     Picture,
     Reboot,
     Refused,
+    Reply,
     SavePreset,
     SetPicture,
     Status,
@@ -105,20 +106,35 @@ class Chores:
             raise Refused("the camera said OK, but its settings have not changed")
 
     def _restart(self, order: orders.Restart, now: float) -> Plan[None]:
-        reply = yield from ask(Reboot())
+        ordered = yield from attempt(Reboot())
+        if ordered.error is not None and not isinstance(ordered.error, Away):
+            raise ordered.error
         self.health.reboot()
-        began, was_down = reply.received, False
+        why_not = "its restart was given up"
         try:
-            while True:
-                now = yield from wait(reply.received + 1.0)
-                reply = yield from attempt(Status())
-                was_down = was_down or isinstance(reply.error, Away)
-                if reply.error is None and (was_down or now - began > DOWN_S):
-                    return
-                if now - began > UP_S:
-                    raise Away(f"it has not come back within {UP_S:.0f} s")
+            yield from self._comes_back(ordered)
+            why_not = ""
+        except Away as error:
+            why_not = str(error)
+            raise
         finally:
-            self.health.rebooted()
+            self.health.rebooted(why_not=why_not)
+
+    def _comes_back(self, ordered: Reply) -> Plan[None]:
+        """Until it answers again; Away when it does not, or when the order itself got lost (some go without a word)."""
+        began, was_down, reply = ordered.received, False, ordered
+        while True:
+            now = yield from wait(reply.received + 1.0)
+            reply = yield from attempt(Status())
+            was_down = was_down or isinstance(reply.error, Away)
+            if reply.error is None and was_down:
+                return
+            if reply.error is None and now - began > DOWN_S:
+                if ordered.error is not None:
+                    raise ordered.error
+                return
+            if now - began > UP_S:
+                raise Away(f"it has not come back within {UP_S:.0f} s")
 
 
 def _has(picture: Picture, wanted: SetPicture) -> bool:

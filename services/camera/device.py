@@ -17,6 +17,7 @@ from typing import Final, Literal, Protocol
 
 from services.bus import Message
 from services.camera.requests import (
+    Away,
     Camera,
     Direction,
     GotoPreset,
@@ -76,8 +77,10 @@ class Lane:
         post: Post,
         clock: Callable[[], float],
         turning: Turning = lambda direction: None,
+        owing: Callable[[bool], None] = lambda on: None,
     ) -> None:
         self.camera = camera
+        self.owing = owing
         self.post = post
         self.clock = clock
         self.turning = turning
@@ -121,11 +124,16 @@ class Lane:
             try:
                 result = self._send(waiting.request)
             except DeviceError as error:
+                if isinstance(error, Away) and self.started:
+                    self.owing(True)
+                elif isinstance(waiting.request, Stop):
+                    self.owing(False)  # it has arrived, whatever the camera thinks of it
                 self._answer(waiting, None, error, sent)
             else:
                 self._answer(waiting, result, None, sent)
         if self.started and stand_still(self.camera, self.clock):
             self.turning(None)
+        self.owing(False)
         self.camera.close()
 
     def _next(self) -> _Waiting | None:
@@ -142,6 +150,7 @@ class Lane:
         if isinstance(request, Stop) or (isinstance(result, Reading) and self._has_driven(result)):
             self.started = self._drives = False
             self.turning(None)
+            self.owing(False)
         return result
 
     def _has_driven(self, reading: Reading) -> bool:
@@ -155,7 +164,10 @@ class Lane:
 
 
 class Device:
-    """A Sender for a camera on the network; `turning` is told what turns, before it does (`watchdog.py`)."""
+    """A Sender for a camera on the network; `turning` is told what turns, before it does (`watchdog.py`).
+
+    `owing` is told when the camera was lost while it turned, and when the stop that it is owed was confirmed.
+    """
 
     def __init__(
         self,
@@ -163,8 +175,9 @@ class Device:
         post: Post,
         clock: Callable[[], float] = time.time,
         turning: Turning = lambda direction: None,
+        owing: Callable[[bool], None] = lambda on: None,
     ) -> None:
-        self.control = Lane("camera control", connect(), post, clock, turning)
+        self.control = Lane("camera control", connect(), post, clock, turning, owing)
         self.pictures = Lane("camera pictures", connect(), post, clock)
 
     def submit(self, request: Request, ticket: int) -> None:

@@ -64,10 +64,10 @@ class Health:
         self.rebooting = True
         self.state, self.reason = "rebooting", "as ordered"
 
-    def rebooted(self) -> None:
-        """It is up again."""
+    def rebooted(self, *, why_not: str = "") -> None:
+        """It is up again, or nobody waits for it any longer."""
         self.rebooting = False
-        self.state, self.reason = "online", ""
+        self.state, self.reason = ("offline", why_not) if why_not else ("online", "")
 
     def _away(self, reply: Reply, state: State, reason: str) -> None:
         self.failures += 1

@@ -30,7 +30,7 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     view = eye(config)
     watchdog = Watchdog(config.brand, address)
     gate = Gate(config.login_retry_s)
-    device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell)
+    device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell, owing=gate.owe)
     made_sound = getattr(brand(config.brand), "sound", None)
     sender = Desk(device, made_sound(address, gate) if made_sound else None, post)
     channel = Channel(config.name, config.stream, address, config.kind, post, gate)

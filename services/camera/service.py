@@ -170,9 +170,7 @@ class CameraService:
     def _reply(self, reply: Reply, now: float) -> None:
         self.counters["requests"] += 1
         self.counters["failed_requests"] += reply.error is not None
-        # whoever hears "online" may order at once, so where it looks must be known by then
-        is_sign = reply.error is not None or self.health.online or isinstance(reply.result, Reading)
-        if reply.request.rank is not Rank.PICTURE and is_sign:
+        if reply.request.rank is not Rank.PICTURE:
             self.health.take(reply)
         if isinstance(reply.result, Reading):
             self.bulletin.take(reply.result, reply.received)

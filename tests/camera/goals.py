@@ -10,7 +10,7 @@ import random
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 from unittest.mock import Mock
 
 from pydantic import SecretStr
@@ -21,7 +21,7 @@ from services.camera.plan import Plan, Run, Stage
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import Arrival, goto
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Reading, Reply, Request
+from services.camera.requests import Reading, Reply, Request, Status
 from services.errors import DeviceError
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, realm
@@ -96,6 +96,7 @@ class Rig:
         address = Address("http://192.0.2.9", "ros", SecretStr("secret123"))
         self.client = Amcrest(address, self.wire)
         self.skill.forget_senses(flip=True, mirror=True)
+        self.near = cast(Reading, self._send(Status(), 0).result)  # as the service polls it
 
     def go(self, goal: Goal, **more: Any) -> Outcome:
         """One goal."""

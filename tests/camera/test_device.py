@@ -94,3 +94,21 @@ def test_a_camera_at_rest_is_sent_nothing_at_the_end() -> None:
     sender, _ = device(control, pictures)
     sender.close()
     assert control.got == []
+
+
+def test_a_camera_that_is_lost_while_it_turns_is_owed_a_stop_until_one_has_arrived() -> None:
+    control, pictures, owed = Slow(deaf=1), Slow(), queue.Queue[bool]()
+    each = iter((control, pictures))
+    inbox: queue.Queue[Message] = queue.Queue()
+    sender = Device(lambda: next(each), inbox.put, owing=owed.put)
+    control.leave.set()
+    sender.submit(Start(Direction.LEFT), 1)
+    assert reply(inbox).error is None
+    assert owed.empty()
+    sender.submit(Stop(), 2)
+    assert isinstance(reply(inbox).error, Away)
+    assert owed.get(timeout=WAIT_S) is True
+    sender.submit(Stop(), 3)
+    assert reply(inbox).error is None
+    assert owed.get(timeout=WAIT_S) is False
+    sender.close()

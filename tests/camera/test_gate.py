@@ -256,3 +256,16 @@ def test_an_answer_from_before_a_refusal_does_not_open_the_way_for_more() -> Non
     book.failed(0.0, sure=False)
     book.passed(early, 0.0)
     assert (early, late, book.failures) == (0, 0, 1)
+
+
+def test_while_a_stop_is_owed_only_what_is_urgent_is_sent() -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    visitors.gate.owe(True)
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(visitors.get, "pictures")
+        assert visitors.get("control") == 200
+        assert (camera.served, waiting.done()) == (1, False)
+        visitors.gate.owe(False)
+        assert waiting.result(WAIT_S) == 200
+    assert camera.served == 2

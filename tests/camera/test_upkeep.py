@@ -125,6 +125,22 @@ def test_an_ordered_reboot_is_followed_by_a_look_at_everything(tmp_path: Path) -
     assert abs(things.fast_s) < 1.0
 
 
+@pytest.mark.parametrize(("down_s", "state", "status"), [(60, "done", "online"), (200, "failed", "offline")])
+def test_a_camera_that_restarts_without_confirming_the_order_is_waited_for(
+    tmp_path: Path, down_s: float, state: str, status: str
+) -> None:
+    flat, _ = flat_with(tmp_path)
+    flat.online().run(5)
+    flat.camera.away = Away("the connection was reset")
+    flat.order("Reboot", "True")
+    flat.run(down_s)
+    flat.camera.away = None if state == "done" else flat.camera.away
+    flat.until(flat.ended, 30)
+    assert flat.last()["state"] == state
+    assert flat.payloads("status")[-1]["state"] == status
+    assert "rebooting" in [one["state"] for one in flat.payloads("status")]
+
+
 def test_the_diagnostics_tell_card_settings_queue_and_alarm(tmp_path: Path) -> None:
     flat, _ = flat_with(tmp_path)
     flat.online().run(30)

@@ -160,3 +160,20 @@ def certain(skill: Skill, drive: Drive) -> bool:
         case MoveTo(form=form):
             return skill.honours.get(form) == "yes"
     return False
+
+
+def honoured(skill: Skill, drive: Drive) -> bool:
+    """Whether this was tried before, and worked."""
+    if isinstance(drive.request, GotoPreset):
+        return drive.request.number in skill.presets
+    return skill.honours.get(drive.request.form) == "yes"
+
+
+def pan_only(skill: Skill) -> bool:
+    """Whether the firmware takes a position, but ignores its tilt."""
+    return "pan" in skill.honours.values() and "yes" not in skill.honours.values()
+
+
+def to_pan(here: Pose, to: Pose) -> Drive:
+    """To a pan and a zoom, on such firmware."""
+    return Drive(MoveTo(to[PAN] % 360.0, round(here[TILT], 1), to[ZOOM], "PositionABS"), to)

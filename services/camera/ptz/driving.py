@@ -34,7 +34,7 @@ class Driving:
         aim = (self.helm.aim[PAN], self.helm.aim[TILT], self.helm.goal.pose[ZOOM])
         while self.helm.zoom_ends is None and self.drives < MOST_DRIVES:
             way = own.find(here, aim, self.helm.limits, self.helm.skill, self.presets)
-            if way is None or way.request in self.tried:
+            if way is None or way.request in self.tried or (self.drives and not own.honoured(self.helm.skill, way)):
                 break
             self.drives += 1
             self.tried.append(way.request)

@@ -36,6 +36,7 @@ class Helm:
         self.aim: Pose = (pan, tilt, zoom)
         self.commands = 0
         self.zoom_ends: float | None = None
+        self.quiet = 0.0  # until then the firmware drives by itself
         self.course = Course(limits, skill, self.aim)
 
     def pose(self, reading: Reading) -> Pose:
@@ -127,7 +128,7 @@ class Helm:
         """When a reading has to be asked for that shows everything at rest."""
         pace = self.skill.paces[PAN]
         doubt = 2 * pace.other_doubt(READ_LATE) + pace.other(READ_PART) * self.skill.timing.spread
-        return self.course.rests_at() - pace.other(READ_LATE) + min(LONGEST_DOUBT_S, doubt)
+        return max(self.quiet, self.course.rests_at()) - pace.other(READ_LATE) + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:
         """Where zoom truly stands: what was reckoned, as far as its reading allows."""

@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import cast
 
 from services.camera.plan import Plan, wait
-from services.camera.ptz.course import PAN, TILT
+from services.camera.ptz import drive as own
+from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.leg import GOOD_DEG, NEAR_DEG, Leg, Way, choose
 from services.camera.ptz.zooming import Zooming
@@ -16,8 +17,10 @@ from services.camera.requests import Reading, Refused, Status
 
 RUNGS = 6  # legs without a rest between them
 RECKONED_DEG = 0.3
-FEW_COMMANDS = 5  # after so many, accuracy goes before time
-DEARER = 0.7  # each command more makes a correction so much dearer
+FEW_COMMANDS = 3  # after so many, accuracy goes before time
+DEARER = 0.5  # each command more makes a correction so much dearer
+MANY_COMMANDS = 7  # after so many, a look has to be worth more
+ENOUGH_DEG = 0.2  # doubt about the place of an end that needs no look
 PROBE_DEG_S = 9.0
 PROBE_S = 0.35  # seen in the readings, and harmless the wrong way
 MOVED_DEG = 0.3
@@ -38,6 +41,8 @@ class Turning:
         try:
             if unsure:
                 now = yield from self._probe(unsure)
+            elif axes == [PAN] and own.pan_only(self.helm.skill):
+                return (yield from self._home_pan(now))
             return (yield from self._legs(axes, now, zoom=zoom))
         except Refused:
             if not self.helm.skill.diagonals or len(axes) < 2:
@@ -56,6 +61,8 @@ class Turning:
             axes = others or self._goes_on(leg, now)
             if axes:
                 continue
+            if own.pan_only(self.helm.skill) and (zoom or PAN in leg.parts):
+                return (yield from self._home_pan(now))
             now = yield from (self.zooming.begin() if zoom else self.helm.stop(now))
             zoom, axes = False, self._reckon(now)
             if not axes:
@@ -63,6 +70,16 @@ class Turning:
             if self.helm.zoom_ends is not None:
                 now = yield from wait(max(now, self.helm.zoom_ends))
         return (yield from self.helm.stop(now))
+
+    def _home_pan(self, now: float) -> Plan[float]:
+        """Firmware that takes a position but ignores its tilt ends a leg: pan and zoom become exact, tilt ends."""
+        helm = self.helm
+        here = tuple(helm.course.stopped(axis, now) for axis in range(3))
+        way = own.to_pan((here[0], here[1], here[2]), (helm.aim[PAN], here[TILT], helm.goal.pose[ZOOM]))
+        now = (yield from helm.send(way.request)).received
+        helm.course.leave(here[ZOOM])
+        helm.quiet = now + own.longest(helm.skill, (here[0], here[1], here[2]), way.to)
+        return now
 
     def _reckon(self, now: float) -> list[int]:
         """The axes that will rest beside the goal, where that is reckoned well enough to go on without a reading."""
@@ -131,7 +148,8 @@ class Turning:
                 send = min(ends.values()) - usual
             if look == LOOKS or send - now < usual + spread:
                 break
-            if all(self.helm.course.doubt(axis, ends[axis]) < max(0.4 * spread * rates[axis], 0.2) for axis in left):
+            enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else NEAR_DEG
+            if all(self.helm.course.doubt(axis, ends[axis]) < max(0.4 * spread * rates[axis], enough) for axis in left):
                 break
             latest = send - usual - spread
             sure = all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)

@@ -26,4 +26,8 @@ def fetch(http: httpx.Client, target: str, timeout: httpx.Timeout = COMMAND) -> 
     try:
         return http.get(target, timeout=timeout)
     except httpx.HTTPError as error:
+        if isinstance(error, httpx.ConnectError) and "refused" in str(error):
+            raise Away(
+                "no answer from the camera: it refuses connections, is starting again or has no web server on"
+            ) from error
         raise Away(f"no answer from the camera: {type(error).__name__} {error}".strip()) from error

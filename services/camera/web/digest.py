@@ -150,6 +150,7 @@ class Login(httpx.Auth):
 
         BadLogin or Locked when the gate is closed, or closes; a 401 that proves nothing goes to the caller.
         """
+        self.gate.give_way(urgent=self.urgent)
         self._enter()
         refusals = 0
         for _ in range(MOST_SENDS):

@@ -23,6 +23,7 @@ MOST_FAILURES = 3
 MOST_ODD, ODD_WINDOW_S = 7, 10.0
 RETRY_S, LONGEST_RETRY_S = 120.0, 1800.0  # a lock lasts about 30 minutes
 ODD_S = 0.5  # an odd refusal of a valid login is over after so long
+WAY_S = 5.0  # who waits longer for a stop that goes first gives up
 PATIENCE_S = 30.0  # who waits longer for the outcome of other logins gives up
 
 
@@ -138,6 +139,19 @@ class Gate:
         self.clock = clock
         self.pause = pause
         self.changed = threading.Condition()
+        self.stop_owed = False  # the camera was lost while it turned: a stop is to be the first that reaches it
+
+    def owe(self, on: bool) -> None:
+        """A stop is owed from now on, or was confirmed."""
+        with self.changed:
+            self.stop_owed = on
+            self.changed.notify_all()
+
+    def give_way(self, *, urgent: bool) -> None:
+        """Before anything is sent: lets a stop go first. Away when that takes too long."""
+        with self.changed:
+            if not urgent and not self.changed.wait_for(lambda: not self.stop_owed, WAY_S):
+                raise Away("a stop goes first, and the camera does not answer it")
 
     def check(self) -> None:
         """BadLogin or Locked when nobody may try now."""
@@ -158,6 +172,7 @@ class Gate:
 
         BadLogin or Locked when nobody may try now, Away when the others take too long. `urgent` is for control.
         """
+        self.give_way(urgent=urgent)
         with self.changed:
             if not self.changed.wait_for(lambda: self._open(urgent), PATIENCE_S):
                 raise Away("other logins to this camera have no answer yet")

@@ -5,80 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Literal
 
+from services.simulators.camera.defaults import defaults
 from services.simulators.camera.profiles import Profile
 from services.simulators.true_camera import Lens
 
 Colour = Literal["colour", "auto", "bw"]
 LEAST_SIDE, MOST_SIDE = 64, 4096  # of a picture, pixels
-SUB_WIDTH = 704  # the substream's; its height follows the main stream's shape
 MODES: dict[str, Colour] = {"0": "colour", "1": "auto", "2": "bw"}
+LOOKS = ("VideoColor", "VideoInDayNight", "VideoInMode", "LeLensMask")  # writing these exposes anew
 DAY_NIGHT: dict[str, Colour] = {"Color": "colour", "Brightness": "auto", "BlackWhite": "bw"}
 
 
-def _options(profile: Profile) -> dict[str, str]:
-    table = {}
-    for part in ("", "NightOptions.", "NormalOptions."):
-        for key, value in (("DayNightColor", "1"), ("Flip", "true"), ("Mirror", "true")):
-            table[f"VideoInOptions[0].{part}{key}"] = value
-    table["VideoInOptions[0].InfraRed"] = "false"
-    table["VideoInOptions[0].NightOptions.SwitchMode"] = "0"
-    table["VideoInOptions[0].Rotate90"] = "0"
-    if profile.daynight == "VideoInDayNight":
-        table = {key: value for key, value in table.items() if not key.endswith("DayNightColor")}
-        table |= {f"VideoInDayNight[0][{p}].Mode": "Brightness" for p in range(3)}
-    return table
-
-
-def _colours() -> dict[str, str]:
-    return {
-        f"VideoColor[0][{p}].{key}": "50" for p in range(3) for key in ("Brightness", "Contrast", "Hue", "Saturation")
-    }
-
-
-def _encoders(lens: Lens) -> dict[str, str]:
-    table: dict[str, str] = {}
-    sizes = {"MainFormat": (lens.width, lens.height), "ExtraFormat": (SUB_WIDTH, SUB_WIDTH * lens.height // lens.width)}
-    for name, (width, height) in sizes.items():
-        video: dict[str, object] = {
-            "BitRate": 1024,
-            "BitRateControl": "VBR",
-            "Compression": "H.264",
-            "FPS": 10,
-            "GOP": 20,
-        }
-        video |= {"Height": height, "Quality": 4, "Width": width}
-        start = f"Encode[0].{name}[0]."
-        table |= {f"{start}Video.{key}": str(value) for key, value in video.items()}
-        table |= {f"{start}VideoEnable": "true", f"{start}AudioEnable": "true"}
-        table |= {f"{start}Audio.Compression": "G.711A", f"{start}Audio.Frequency": "8000"}
-    return table
-
-
-def _motion() -> dict[str, str]:
-    switches = {"Enable": "true", "EventHandler.Dejitter": "5", "Level": "3", "RecordEnable": "false"}
-    return {f"MotionDetect[0].{key}": value for key, value in switches.items()}
-
-
-def defaults(profile: Profile, lens: Lens) -> dict[str, str]:
-    """What a camera that was hung from a ceiling and set up holds."""
-    return {
-        "General.LocalNo": "8",
-        "General.MachineName": "Camera1",
-        **_options(profile),
-        **_colours(),
-        **_motion(),
-        **_encoders(lens),
-        "RTSP.Enable": "true",
-        "RTSP.Port": "554",
-    }
-
-
 class Tables:
-    """The tables of one camera; `changes` grows with every write, `encoders` with those to the Encode table."""
+    """The tables of one camera.
+
+    `changes` grows with every write, `encoders` with those that restart the encoders, `looks` with those that change
+    how the picture is taken; `exposed_at` is when the last of these was.
+    """
 
     def __init__(self, profile: Profile, lens: Lens) -> None:
         self._profile, self._values, self.changes = profile, defaults(profile, lens), 0
-        self.encoders = 0
+        self.encoders = self.looks = 0
+        self.exposed_at = float("-inf")
 
     def read(self, name: str) -> list[str] | None:
         """The lines of a table or a part of it; None when there is no such table."""
@@ -89,13 +37,16 @@ class Tables:
         narrowed = "[" in name or "." in name
         return [] if narrowed and not self._profile.config_narrowing else lines
 
-    def write(self, pairs: Iterable[tuple[str, str]]) -> bool:
+    def write(self, pairs: Iterable[tuple[str, str]], now: float = 0.0) -> bool:
         """Sets values; keys it does not have are passed over in silence, as cameras do. False: an unknown table."""
         pairs = list(pairs)
         if not pairs or any(key.partition("[")[0].partition(".")[0] not in self._names() for key, _ in pairs):
             return False
         known = {key: _like(self._values[key], value, key) for key, value in pairs if key in self._values}
+        looks = any(_exposes(key) and self._values[key] != value for key, value in known.items())
         self._values |= known
+        if looks:
+            self.looks, self.exposed_at = self.looks + 1, now
         self.changes += bool(known)
         self.encoders += any(key.startswith("Encode[") for key in known)
         return True
@@ -117,6 +68,11 @@ class Tables:
         return int(self._values[key])
 
     @property
+    def covered(self) -> bool:
+        """Whether the lens is turned away for privacy."""
+        return self._values.get("LeLensMask[0].Enable") == "true"
+
+    @property
     def colour(self) -> Colour:
         """What the day and night switch asks for."""
         if self._profile.daynight == "VideoInDayNight":
@@ -125,6 +81,10 @@ class Tables:
 
     def _names(self) -> set[str]:
         return {key.partition("[")[0].partition(".")[0] for key in self._values}
+
+
+def _exposes(key: str) -> bool:
+    return key.startswith(LOOKS) or key.endswith("DayNightColor")
 
 
 def _like(old: str, new: str, key: str) -> str:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from random import Random
 from threading import RLock
 from typing import Literal
 
+from services.simulators.camera.clock import Clock
 from services.simulators.camera.config_tables import Tables
-from services.simulators.camera.events import Events
+from services.simulators.camera.events import CODES, Events
+from services.simulators.camera.identity import Identity
 from services.simulators.camera.latency import Latency
 from services.simulators.camera.messages import OK, Answer, Request, lines, refusal, refuses_brackets
+from services.simulators.camera.motion import MotionDetector
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.profiles import Profile
 from services.simulators.camera.ptz import Ptz
+from services.simulators.camera.sound import Microphone, Speaker
 from services.simulators.true_camera import WorldCamera
 
 Program = Callable[[Request, float], Answer]
@@ -28,9 +31,10 @@ class Device:
         self.latency = latency or Latency(profile, None, Random(1))
         self.tables = Tables(profile, camera.lens)
         self.ptz = Ptz(camera, profile, self.tables, self.latency, now)
-        self.events = Events()
+        self.events, self.detector = Events(profile), MotionDetector(self.tables)
+        self.identity, self.clock = Identity(profile, camera.serial, self.tables), Clock(now)
+        self.microphone, self.speaker = Microphone(seed=1), Speaker()
         self.boots_until = float("-inf")
-        self.clock_offset_s = 0.0  # how far its clock is ahead of the true time
         self.rights = True  # whether the account may do more than look
         self._dice = Random(camera.serial)
         self._lock = RLock()
@@ -41,6 +45,10 @@ class Device:
             "eventManager": self._event_manager,
             "ptz": self.ptz.answer,
             "ptzBase": self.ptz.answer,
+            "IntervideoManager": self.identity.versions,
+            "storageDevice": self.identity.storage,
+            "devAudioInput": self.identity.sound_devices,
+            "devAudioOutput": self.identity.sound_devices,
         }
 
     def answer(self, request: Request, now: float) -> Answer:
@@ -69,6 +77,14 @@ class Device:
         with self._lock:
             return act()
 
+    def watch(self, now: float) -> None:
+        """Looks for motion; to be called several times a second."""
+        with self._lock:
+            rates = self.ptz.motors.rates(now)
+            change = None if self.booting(now) else self.detector.update(now, turning=any(rates))
+        if change is not None:
+            self.events.tell("VideoMotion", change)
+
     def drops_snapshot(self) -> Literal["close", "text"] | None:
         """Whether this snapshot has no answer, or one that is no picture, as happens with some firmware."""
         if self._dice.random() >= self.profile.snapshot_drop:
@@ -80,43 +96,52 @@ class Device:
         return now < self.boots_until
 
     def _magic_box(self, request: Request, now: float) -> Answer:
-        profile = self.profile
-        version = [f"version={profile.firmware}", f"BuildDate={profile.built}"]
-        if profile.version_form == "one line":
-            version = [f"version={profile.firmware},build:{profile.built}"]
-        facts = {
-            "getDeviceType": [f"type={profile.model}"],
-            "getSerialNo": [f"sn={self.camera.serial}"],
-            "getSoftwareVersion": version,
-            "getMachineName": [f"name={self.tables.text('General.MachineName')}"],
-            "getVendor": ["vendor=Amcrest"],
-        }
-        if request.action == "reboot":
+        if request.action in ("reboot", "shutdown"):  # some models come up again after a shutdown too
             return self.reboot(now)
-        return lines(facts[request.action]) if request.action in facts else refusal(profile)
+        return self.identity.magic_box(request, now)
 
     def reboot(self, now: float) -> Answer:
         """Presets and configuration stay; the motors return to where they are after power-on."""
         self.boots_until = now + self.profile.boot_s
         self.latency.drowsy_until = self.boots_until + self.profile.drowsy_s
         self.ptz.motors.place(Pose(*self.camera.starts_at), now)
+        self.events.forget()
+        self.detector.forget()
         return OK
 
     def _global(self, request: Request, now: float) -> Answer:
-        if request.action != "getCurrentTime":
-            return refusal(self.profile)
-        return lines([f"result={time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(now + self.clock_offset_s))}"])
+        if request.action == "getCurrentTime":
+            return lines([f"result={self.clock.tell(now)}"])
+        return (
+            self._set_time(request.text("time"), now) if request.action == "setCurrentTime" else refusal(self.profile)
+        )
+
+    def _set_time(self, text: str, now: float) -> Answer:
+        """Answered alike whether the text was understood or not; what it does not read as a time changes nothing."""
+        before = self.clock.tell(now)
+        if self.clock.put(text, now):
+            self.events.tell("TimeChange", "Pulse", data={"BeforeModifyTime": before, "ModifiedTime": text})
+        return OK
 
     def _config_manager(self, request: Request, now: float) -> Answer:
         if request.action == "getTours":
             return self.ptz.list_tours()
         if request.action == "setConfig":
-            pairs = [(key, value) for key, value in request.query if key != "action"]
-            return OK if self.tables.write(pairs) else refusal(self.profile)
+            return self._write([(key, value) for key, value in request.query if key != "action"], now)
         found = self.tables.read(request.text("name")) if request.action == "getConfig" else None
         return refusal(self.profile) if found is None else lines(found)
 
+    def _write(self, pairs: list[tuple[str, str]], now: float) -> Answer:
+        covered = self.tables.covered
+        if not self.tables.write(pairs, now):
+            return refusal(self.profile)
+        if self.tables.covered != covered:
+            self.events.tell("LensMaskOpen" if self.tables.covered else "LensMaskClose", "Pulse")
+        return OK
+
     def _event_manager(self, request: Request, now: float) -> Answer:
+        if request.action == "getCaps":
+            return lines(f"caps.Events[{i}]={code}" for i, code in enumerate(CODES))
         if request.action != "getEventIndexes":
             return refusal(self.profile)
         channels = self.events.active(request.text("code"))

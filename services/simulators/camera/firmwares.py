@@ -20,6 +20,7 @@ PROFILES: dict[str, Profile] = {
         mirror_inverts_motors=False,
         heartbeat=False,
         preset_max=8,
+        lens_mask=False,
     ),
     "ip2m-841b-strict": Profile(
         model="IP2M-841B",
@@ -30,6 +31,8 @@ PROFILES: dict[str, Profile] = {
         status_form="b",
         error_style="400-body",
         config_narrowing=False,
+        device_class=False,
+        lens_mask=False,
     ),
     # Takes a position, but lies about whether it moves.
     "ip4m-1041b": Profile(
@@ -46,6 +49,7 @@ PROFILES: dict[str, Profile] = {
         auto_scan=True,
         move_status="always-idle",
         pan_speeds=(2.0, 5.0, 9.0, 15.0, 24.0, 36.0, 51.0, 68.0),
+        event_length_space=True,
     ),
     "ip4m-1051b-2019": Profile(
         model="IP4M-1051B",
@@ -72,6 +76,7 @@ PROFILES: dict[str, Profile] = {
         ptz_channels=(1,),
         status_dither=True,
         tilt_share=0.5,
+        event_form="A",
     ),
     "2020s-dahua": Profile(
         model="IPC-AW46WN",
@@ -85,6 +90,8 @@ PROFILES: dict[str, Profile] = {
         daynight="VideoInDayNight",
         position_abs="full",
         presets_form="long",
+        event_form="A",
+        event_header_twice=True,
     ),
     "dahua-pan-only": Profile(
         model="IPC-A35",
@@ -99,6 +106,9 @@ PROFILES: dict[str, Profile] = {
         lockout_of="address",
         latency_s=0.45,
         latency_spread_s=0.2,
+        event_form="A",
+        lens_mask=False,
+        event_blank_lines=2,
     ),
     # The newest: SHA-256, timed moves, positions in shares of the travel.
     "sd2a-2023": Profile(
@@ -124,5 +134,9 @@ PROFILES: dict[str, Profile] = {
         position_key="Position",
         latency_s=0.15,
         latency_spread_s=0.05,
+        event_form="A",
+        event_header_twice=True,
+        event_length_space=True,
+        event_blank_lines=1,
     ),
 }

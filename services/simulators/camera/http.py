@@ -9,35 +9,24 @@ from collections import deque
 from collections.abc import Callable, Generator
 from contextlib import closing, suppress
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from socketserver import TCPServer
+from http.server import BaseHTTPRequestHandler
 from threading import Event, Lock
 from typing import Any
 
+from services.simulators.camera import audio
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, Verdict
 from services.simulators.camera.endless import ENDLESS
 from services.simulators.camera.faults import Faults, Network
 from services.simulators.camera.messages import Answer, Request, read, refusal, spelt
 from services.simulators.camera.onvif.service import Onvif
+from services.simulators.camera.port import Port
 from services.simulators.camera.view.picture import Pictures
 
 IMAGE = "image/jpeg"
 LOG_LENGTH = 2000
 SOAP_BYTES = 1 << 20
 ROOT = b"<html><head><title>WEB</title></head><body></body></html>"
-
-
-class Port(ThreadingHTTPServer):
-    """A port that asks no name server for its own name, and waits for its threads when it is closed."""
-
-    daemon_threads = False
-    request_queue_size = 64
-
-    def server_bind(self) -> None:
-        """Binds; the name is the address."""
-        TCPServer.server_bind(self)
-        self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
 
 
 class CameraServer(Port):
@@ -67,26 +56,31 @@ class CameraServer(Port):
         with self._lock:
             return self.door.judge(method, target, header, self.clock(), address)
 
-    @property
-    def is_off(self) -> bool:
-        """Whether nobody is answered: it restarts, or is switched off, or a router says that it is not there."""
-        return self.device.booting(self.clock()) or self.closing.is_set() or self.network.refuses
-
-    @property
-    def connected(self) -> int:
-        """How many connections there are."""
-        return len(self._open)
-
     def judge_viewer(self, method: str, header: str | None) -> bool:
         """The same for RTSP, where the challenge is another's."""
         with self._lock:
             return self.door.judge_viewer(method, header, self.clock())
 
     @property
+    def is_off(self) -> bool:
+        """Whether nobody is answered: it restarts, or is switched off, or a router says that it is not there."""
+        return self.device.booting(self.clock()) or self.closing.is_set() or self.network.refuses
+
+    @property
     def shows_pictures(self) -> bool:
         """Whether new pictures go out."""
-        on = self.running.is_set() and self.network.up.is_set() and not self.is_off
-        return on and not self.faults.frozen_stream
+        way = self.running.is_set() and self.network.up.is_set()
+        return way and not self.faults.frozen_stream and not self.is_off
+
+    @property
+    def turns_viewers_away(self) -> bool:
+        """Whether a new RTSP connection is closed at once."""
+        return self.faults.always == "close" or not self.network.up.is_set()
+
+    @property
+    def connected(self) -> int:
+        """How many connections there are."""
+        return len(self._open)
 
     def enter(self, connection: socket.socket) -> None:
         """A connection was opened."""
@@ -116,10 +110,10 @@ class CameraServer(Port):
             self.door.forget()
         self.drop()
 
-    def challenges(self) -> list[str]:
+    def challenges(self, *, stale: bool = False) -> list[str]:
         """What the door asks of somebody who said nothing."""
         with self._lock:
-            return self.door.challenges()
+            return self.door.challenges(stale=stale)
 
     def drop(self) -> None:
         """Cuts every connection."""
@@ -199,7 +193,13 @@ class Connection(BaseHTTPRequestHandler):
 
     def _serve(self, request: Request, entry: dict[str, Any]) -> None:
         endless = ENDLESS.get((request.cgi, request.action))
-        if endless is not None:
+        if (
+            request.cgi == "audio" and request.text("channel", "1") == "0"
+        ):  # never good here, and this is how it says so
+            self._challenge(Verdict(False, self.server.challenges(stale=True)), entry)
+        elif request.cgi == "audio" and request.action == "postAudio" and self.command == "POST":
+            self._speaker(entry)
+        elif endless is not None:
             self._endless(endless(self.server, request), entry)
         elif request.cgi == "snapshot":
             self._snapshot(request, entry)
@@ -244,6 +244,13 @@ class Connection(BaseHTTPRequestHandler):
         if how := self.server.device.drops_snapshot():
             return self._fail(how, entry)
         return self._send(Answer(self.server.faults.picture(data), content_type=IMAGE), entry)
+
+    def _speaker(self, entry: dict[str, Any]) -> None:
+        length, kind = self.headers.get("Content-Length", ""), self.headers.get("Content-Type", "")
+        entry["status"] = 200
+        answer = audio.speaker(self.server, self.rfile, int(length) if length.isdigit() else 0, kind)
+        with suppress(OSError):  # whoever sent it has often gone
+            self._send(answer, entry)
 
     def _endless(self, chunks: Generator[bytes], entry: dict[str, Any]) -> None:
         entry["status"] = 200

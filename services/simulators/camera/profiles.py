@@ -58,8 +58,15 @@ class Profile:
     status_dither: bool = False  # a reading at rest is 0.1 more or less at times
 
     daynight: Literal["VideoInOptions", "VideoInDayNight"] = "VideoInOptions"
+    device_class: bool = True  # it answers getDeviceClass
+    lens_mask: bool = True  # it can turn the lens away (LeLensMask)
     config_narrowing: bool = True  # a narrowed table name works; otherwise it gives an empty answer
     heartbeat: bool = True
+    event_form: Literal["A", "B"] = "B"  # A has data
+    event_header_twice: bool = False  # a second header block before the first part
+    event_length_space: bool = False  # after `Content-Length:`
+    event_blank_lines: int = 0  # more than needed between two parts
+    event_listeners: int = 25
     onvif: bool = True  # it has the ONVIF services too
 
     latency_s: float = 0.3  # of each control request

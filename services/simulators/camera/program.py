@@ -23,6 +23,7 @@ from services.simulators.camera.view.picture import Pictures
 from services.simulators.camera.view.scene import Scene
 from services.simulators.world import load
 
+WATCH_S = 0.1  # between two looks of the motion detection
 POLL_S = 0.1  # how long a port may take to notice that it is to close
 
 
@@ -65,6 +66,7 @@ def start(config: Config, *, clock: Callable[[], float] = time.time) -> Iterator
         stack.callback(server.server_close)
         stack.callback(server.switch_off)
         stack.enter_context(_served(server))
+        stack.enter_context(_watching(server))
         side = SideDoor(("127.0.0.1", config.side_door_port), server)
         stack.callback(side.server_close)
         stack.enter_context(_served(side))
@@ -96,6 +98,23 @@ def _server(config: Config, clock: Callable[[], float]) -> CameraServer:
     if behind.device.profile.onvif:
         server.onvif = Onvif(behind.device, config.user, config.password.get_secret_value())
     return server
+
+
+@contextmanager
+def _watching(server: CameraServer) -> Iterator[None]:
+    """Looks for motion while the camera runs."""
+
+    def watch() -> None:
+        while not server.closing.wait(WATCH_S):
+            server.device.watch(server.clock())
+
+    thread = Thread(target=watch, name="motion detection")
+    thread.start()
+    try:
+        yield
+    finally:
+        server.closing.set()
+        thread.join()
 
 
 @contextmanager

@@ -2,9 +2,15 @@
 
 GET  /state                              true pose, reading, motion, the door's counters, frames rendered and their rate
 GET  /motors                             what they can (position, speeds, accelerations) and what they did (counters)
+GET  /played                             what was sent to the speaker: kind, bytes, seconds of sound, how long it took
+GET  /played.wav                         the last of it as a WAV file
 GET  /log                                requests: time, method, target, status, authorized
 POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand there at once
-POST /event    {"code", "action", "index"}
+POST /event    {"code", "action", "index", "data"}
+POST /stir     {"seconds"}               something moves before the lens for so long
+POST /tone     {"hertz"}                 what the microphone hears
+POST /clock    {"offset_s", "drift_ppm"} the camera's clock is wrong by so much, and gains so many us/s
+POST /card     {"in"}                    whether a memory card is in it
 POST /fail     {"n", "how"}              the next n requests: close, 401, 500 or text
 POST /fault    {"name", "on", ...}       switches a fault on or off; `troubles` lists them and what they take
 POST /well     {}                        switches every fault off
@@ -22,8 +28,10 @@ from http.server import BaseHTTPRequestHandler
 from typing import Any
 
 from services.simulators.camera import troubles
-from services.simulators.camera.http import CameraServer, Port
+from services.simulators.camera.http import CameraServer
 from services.simulators.camera.motors import Axes, reading
+from services.simulators.camera.port import Port
+from services.simulators.camera.sound import wav
 
 Order = Callable[[CameraServer, dict[str, Any]], object]
 
@@ -59,7 +67,23 @@ def _pose(camera: CameraServer, order: dict[str, Any]) -> None:
 
 
 def _event(camera: CameraServer, order: dict[str, Any]) -> None:
-    camera.device.events.tell(str(order["code"]), str(order["action"]), int(order.get("index", 0)))
+    camera.device.events.tell(str(order["code"]), str(order["action"]), int(order.get("index", 0)), order.get("data"))
+
+
+def _stir(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.device.detector.stir(camera.clock() + float(order["seconds"]))
+
+
+def _tone(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.device.microphone.hertz = float(order["hertz"])
+
+
+def _clock(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.device.clock.set_off(camera.clock(), float(order.get("offset_s", 0)), float(order.get("drift_ppm", 0)))
+
+
+def _card(camera: CameraServer, order: dict[str, Any]) -> None:
+    camera.device.identity.card = bool(order["in"])
 
 
 def _fail(camera: CameraServer, order: dict[str, Any]) -> None:
@@ -74,11 +98,22 @@ def _latency(camera: CameraServer, order: dict[str, Any]) -> None:
     camera.device.latency.seconds = float(order["seconds"])
 
 
+def _last_played(camera: CameraServer) -> bytes:
+    played = camera.device.speaker.played
+    return wav(bytes(played[-1].data) if played else b"")
+
+
 VIEWS: dict[str, Callable[[CameraServer], object]] = {"/state": state, "/motors": motors}
+VIEWS["/played"] = lambda camera: [one.told for one in camera.device.speaker.played]
+VIEWS["/played.wav"] = _last_played
 VIEWS["/log"] = lambda camera: list(camera.log)
 ORDERS: dict[str, Order] = {
     "/pose": _pose,
     "/event": _event,
+    "/stir": _stir,
+    "/tone": _tone,
+    "/clock": _clock,
+    "/card": _card,
     "/fail": _fail,
     "/fault": troubles.switch,
     "/well": lambda camera, order: troubles.clear(camera),
@@ -117,9 +152,9 @@ class Visit(BaseHTTPRequestHandler):
         return self._send(200, {})
 
     def _send(self, status: int, value: object) -> None:
-        body = json.dumps(value).encode()
+        body = value if isinstance(value, bytes) else json.dumps(value).encode()
         self.send_response(status)
-        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Type", "audio/wav" if isinstance(value, bytes) else "application/json")
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)

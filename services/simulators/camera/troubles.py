@@ -78,7 +78,7 @@ def _reboot(camera: CameraServer, on: bool, settings: Settings) -> None:
 
 
 def _clock(camera: CameraServer, on: bool, settings: Settings) -> None:
-    camera.device.clock_offset_s = float(settings.get("seconds", 3600.0)) if on else 0.0
+    camera.device.clock.set_off(camera.clock(), float(settings.get("seconds", 3600.0)) if on else 0.0, 0.0)
 
 
 TROUBLES: dict[str, Switch] = {

@@ -49,6 +49,11 @@ class Feed:
             self._running.over.set()
         self._thread.join()
 
+    @property
+    def runs(self) -> bool:
+        """Whether somebody watches."""
+        return self._running is not None and not self._running.over.is_set()
+
     def watch(self, source: Any) -> Watched:
         """An encoder's source is to be fed from now on, instead of the one before."""
         if self._running is not None:

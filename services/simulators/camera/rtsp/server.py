@@ -15,6 +15,7 @@ from services.simulators.camera.rtsp.gstreamer import GLib, Gst, GstRtspServer
 from services.simulators.camera.view.picture import STREAMS, Stream
 
 PATH = "/cam/realmonitor"
+HEAVY_KBPS = 2048
 SESSIONS_CHECKED_S = 5  # how often those are ended who went without a word
 PIPELINE = (
     "( appsrc name=video is-live=true format=time do-timestamp=true max-buffers=3 leaky-type=downstream "
@@ -93,6 +94,7 @@ class Server:
             feed.start()
         self._thread.start()
         self._camera.cuts.append(self.cut)
+        self._camera.device.latency.viewers = self._heavy
         return self
 
     def __exit__(
@@ -116,8 +118,15 @@ class Server:
     def _cut(self) -> None:
         self._server.client_filter(lambda *_: GstRtspServer.RTSPFilterResult.REMOVE)
 
+    def _heavy(self) -> int:
+        """How many streams run that are so large that they slow the camera down."""
+        rate = self._camera.device.tables.number
+        return sum(
+            feed.runs and rate(f"Encode[0].{one}[0].Video.BitRate") > HEAVY_KBPS for one, feed in self._feeds.items()
+        )
+
     def _connected(self, server: Any, client: Any) -> None:
-        if self._camera.is_off:
+        if self._camera.is_off or self._camera.turns_viewers_away:
             self._soon(client.close)
 
     def _soon(self, act: Callable[[], None]) -> None:

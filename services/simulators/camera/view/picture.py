@@ -27,6 +27,7 @@ EXPOSURE_S = 1 / 30  # indoors, by lamp light
 NOISE = 2.2  # grey levels, one sigma
 NOISE_PLAY = 64  # pixels by which the noise pattern is shifted from frame to frame
 QUALITY = 88
+SETTLING_S, DARK = 1.5, 0.25  # a change of mode: how long, and how dark at first; inferred
 AHEAD_M = 3.0  # distance at which the blur of a turn is taken
 
 
@@ -76,22 +77,30 @@ class Pictures:
     def frame(self, stream: Stream, now: float) -> Image:
         """The picture of this moment (BGR), made anew."""
         with self._lock:
-            return self._developed(stream, *self._motors(now))
+            return self._developed(stream, *self._motors(now), self._exposure(now))
 
     def jpeg(self, stream: Stream, now: float) -> bytes:
         """The picture of this moment, encoded."""
         with self._lock:
             pose, rates = self._motors(now)
-            key = (pose, self._tables.changes, int(now * self.fps(stream)))
+            key = (pose, self._tables.changes, self._exposure(now), int(now * self.fps(stream)))
             if stream not in self._newest or self._newest[stream][0] != key:
-                self._newest[stream] = key, _encoded(self._developed(stream, pose, rates))
+                self._newest[stream] = key, _encoded(self._developed(stream, pose, rates, key[2]))
             return self._newest[stream][1]
 
-    def _developed(self, stream: Stream, pose: Pose, rates: Pose) -> Image:
+    def _exposure(self, now: float) -> float:
+        """How much light it has found: a change of mode starts in the dark, and settles in SETTLING_S."""
+        since = now - self._tables.exposed_at
+        return 1.0 if not 0.0 <= since < SETTLING_S else DARK + (1.0 - DARK) * since / SETTLING_S
+
+    def _developed(self, stream: Stream, pose: Pose, rates: Pose, exposure: float) -> Image:
         self._tallies[stream].note()
         size = self.size(stream)
+        if self._tables.covered:
+            return np.zeros((size[1], size[0], 3), np.uint8)
         still = self._still(stream, pose, size)
         image = blurred(still.image, self._sweep(pose, rates, still.window))
+        image = image if exposure == 1.0 else np.asarray(cv2.convertScaleAbs(image, alpha=exposure), np.uint8)
         image = _resized(self._noisy(image), size)
         return upright(self._toned(image), self._camera, self._tables)
 

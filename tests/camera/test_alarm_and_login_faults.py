@@ -1,0 +1,127 @@
+"""Faults on the real service, seen by the motion alarm and the login gate; `test_faults.py` has the rest of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from services.bus import Message
+from services.simulators import camera as simulated
+from tests.camera.bench import Bench, bench, simulator
+
+NOTICED_S = 15.0
+WELL_S = 40.0
+QUICK = {"motion": {"heartbeat_s": 1}, "login_retry_s": 3.0}
+
+
+@pytest.fixture
+def camera() -> Iterator[simulated.Simulated]:
+    with simulator(latency_s=0.02) as running:
+        yield running
+
+
+@pytest.fixture
+def here(tmp_path: Path, camera: simulated.Simulated) -> Iterator[Bench]:
+    with bench(tmp_path, camera, **QUICK) as running:
+        running.until(lambda: running.service.motion.signs > 0 and motion(running) == 0, 10)
+        yield running
+
+
+def state(here: Bench) -> str:
+    return str(here.payloads("status")[-1]["state"])
+
+
+def motion(here: Bench) -> int:
+    return int(here.payloads("motion")[-1]["value"])
+
+
+def door(here: Bench) -> dict[str, int]:
+    counters: dict[str, int] = here.truth()["door"]
+    return counters
+
+
+def log(here: Bench) -> list[dict[str, Any]]:
+    entries: list[dict[str, Any]] = httpx.get(f"{here.camera.side_door_url}/log").json()
+    return entries
+
+
+def for_a_while(here: Bench, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    here.until(lambda: time.monotonic() >= end, seconds + 5)
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [("hang", "offline"), ("password", "bad_login"), ("locked", "locked")],
+)
+def test_a_fault_shows_in_the_status_and_in_the_alarm_and_heals_without_a_restart(
+    here: Bench, fault: str, told: str
+) -> None:
+    here.tell("fault", name=fault)
+    here.tell("drop")
+    here.until(lambda: state(here) == told, NOTICED_S)
+    here.until(lambda: motion(here) == -1, NOTICED_S)
+    here.tell("well")
+    here.until(lambda: state(here) == "online" and motion(here) == 0, WELL_S)
+
+
+def test_after_a_password_change_three_logins_fail_at_most_over_everything_together(
+    tmp_path: Path, camera: simulated.Simulated
+) -> None:
+    with bench(tmp_path, camera, motion={"heartbeat_s": 1}) as here:
+        here.until(lambda: here.service.motion.signs > 0, 10)
+        here.inbox.put(snapshot())
+        here.tell("fault", name="password")
+        here.tell("drop")
+        here.inbox.put(snapshot())
+        here.until(lambda: state(here) == "bad_login", NOTICED_S)
+        for_a_while(here, 5.0)
+        assert 1 <= door(here)["wrong"] <= 3
+        assert state(here) == "bad_login"
+
+
+def snapshot() -> Message:
+    return Message("camera/ip1/snapshot/get", b"", received=time.time())
+
+
+def test_a_slow_camera_stays_usable_and_its_latency_is_told(here: Bench) -> None:
+    here.tell("fault", name="slow", seconds=1.0)
+    for_a_while(here, 6.0)
+    assert state(here) == "online"
+    assert here.service.health.latency > 0.3
+    here.order("Flip", "True", "1")
+    assert here.end_of("1", 20)["state"] == "done"
+
+
+def test_a_clock_that_is_wrong_is_set(tmp_path: Path, camera: simulated.Simulated) -> None:
+    httpx.post(f"{camera.side_door_url}/fault", json={"name": "clock", "seconds": 3600}).raise_for_status()
+    with bench(tmp_path, camera) as here:
+        here.until(lambda: "time_drift_s" in here.service.bulletin.facts.values, 15)
+        written = [entry["target"] for entry in log(here) if "setCurrentTime" in entry["target"]]
+        assert len(written) == 1
+        assert "%20" in written[0]
+
+
+def test_an_idle_camera_that_wants_two_requests_for_each_is_asked_at_most_twice_a_second(tmp_path: Path) -> None:
+    with simulator(profile="2020s-dahua", latency_s=0.02) as camera, bench(tmp_path, camera) as here:
+        for_a_while(here, 5.0)
+        before = len(log(here))
+        for_a_while(here, 12.0)
+        assert len(log(here)) - before <= 2 * 12
+
+
+def test_a_command_takes_at_most_one_request_and_a_tenth_where_nonces_are_reusable(here: Bench) -> None:
+    for_a_while(here, 3.0)
+    before = len(log(here))
+    for number in range(15):
+        here.order("Flip", "True", str(number))
+        assert here.end_of(str(number), 10)["state"] == "done"
+    entries = log(here)[before:]
+    answered = [entry for entry in entries if entry["status"] != 401]
+    assert len(entries) <= 1.1 * len(answered)
+    assert len(answered) >= 30
