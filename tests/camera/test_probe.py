@@ -36,7 +36,8 @@ from tests.camera.bench import PASSWORD, SHIPPED, simulator
 LATENCY_S = 0.03
 AT_ONCE = 4
 UNSEEN = {  # switches that cannot be seen from outside, or only by doing harm
-    "boot_s", "drowsy_s", "latency_spread_s", "latency_tail", "lockout_failures", "lockout_of", "lockout_s",
+    "boot_s", "drowsy_s", "event_listeners", "latency_spread_s", "latency_tail",
+    "lockout_failures", "lockout_of", "lockout_s",
     "max_connections", "over_limit", "pan_acceleration", "pan_speeds", "snapshot_drop", "spurious_401", "status_lag_s",
     "stream_slowdown_s", "tilt_acceleration", "zoom_acceleration", "zoom_speed",
 }  # fmt: skip
@@ -293,7 +294,9 @@ def test_its_profile_makes_a_simulated_camera_of_the_same_ways(meetings: dict[st
 @pytest.mark.parametrize("part", [b"Heartbeat", b"Code=VideoMotion;action=Start;index=0;data={\n}\n"])
 def test_blank_lines_between_parts_are_counted(part: bytes, tail: bytes, blank: int) -> None:
     whole = b"--myboundary\r\nContent-Length:9\r\n\r\n" + part + b"\r\n\r\n" + tail
+    header = b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=myboundary\r\n\r\n"
     assert read_events(whole + whole)["event_blank_lines"] == blank
+    assert read_events(header + whole + whole)["event_blank_lines"] == blank
 
 
 def test_names_and_addresses_are_taken_out() -> None:

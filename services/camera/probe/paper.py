@@ -12,9 +12,6 @@ from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
 
 MEASURED = ("latency_s", "snapshot_s", "tilt_share")
-NOT_SWITCHES = (  # of no profile; they are in the report
-    "event_form", "event_header_twice", "event_length_space", "event_blank_lines", "device_class", "lens_mask",
-)  # fmt: skip
 
 
 def section(found: Findings, name: str, user: str) -> str:
@@ -57,7 +54,7 @@ def profile(found: Findings) -> str:
 
 def switches(found: Findings) -> dict[str, Any]:
     """What a simulator's profile takes, in its own words."""
-    known = {key: value for key, value in found.switches.items() if value is not None and key not in NOT_SWITCHES}
+    known = {key: value for key, value in found.switches.items() if value is not None}
     seen = {"model": found.model, "firmware": found.firmware, "built": found.built, **known}
     if "median" in found.latency_ms:
         seen["latency_s"] = round(found.latency_ms["median"] / 1000, 3)

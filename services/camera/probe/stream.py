@@ -59,7 +59,8 @@ def read_events(body: bytes) -> dict[str, Any]:
     length = re.search(rb"Content-Length:( ?)(\d+)", body, re.IGNORECASE)
     if length:
         form["event_length_space"] = bool(length[1])
-    between = re.search(rb"(?:[^\r\n]\n?)\r\n\r\n((?:\r\n)*)--\w", body)  # after a part: an empty line, and more
-    if between:
-        form["event_blank_lines"] = len(between[1]) // 2
+        parts = body[length.end() :]  # a second header block ends in an empty line too
+        between = re.search(rb"(?:[^\r\n]\n?)\r\n\r\n((?:\r\n)*)--\w", parts)
+        if between:
+            form["event_blank_lines"] = len(between[1]) // 2
     return form
