@@ -343,6 +343,41 @@ def test_the_command_tells_each_step_and_leaves_its_papers(tmp_path: Path) -> No
     assert PASSWORD not in done.stdout + done.stderr
 
 
+def test_on_a_terminal_it_asks_before_anything_moves(tmp_path: Path) -> None:
+    with simulator(latency_s=0.01) as camera:
+        words = [sys.executable, "-m", "services", "probe", "ip9", "--url", camera.url, "--user", "ros"]
+        environment = {
+            **os.environ,
+            "PYTHONPATH": str(SHIPPED.parent),
+            "CAMERA_IP9_PASSWORD": PASSWORD,
+            "TERM": "xterm",
+        }
+        ours, theirs = os.openpty()
+        with subprocess.Popen(
+            words, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs, env=environment
+        ) as process:
+            os.close(theirs)
+            shown = ""
+            while "May it move now?" not in shown:
+                shown += os.read(ours, 65536).decode()
+            os.write(ours, b"n\n")
+            while process.poll() is None:
+                shown += read_all(ours)
+        os.close(ours)
+        assert process.returncode == 0, shown
+        assert not [entry for entry in camera.server.log if "action=start" in entry["target"]]
+    assert "only a moving camera shows it" in shown
+    assert PASSWORD not in shown
+
+
+def read_all(terminal: int) -> str:
+    """What there is to read of a terminal; nothing when its other side is closed."""
+    try:
+        return os.read(terminal, 65536).decode(errors="replace")
+    except OSError:
+        return ""
+
+
 def test_the_command_gives_data_and_takes_a_configured_camera(tmp_path: Path) -> None:
     with simulator(latency_s=0.01) as camera:
         config = tmp_path / "apartment.yaml"

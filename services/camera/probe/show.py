@@ -167,6 +167,8 @@ def _head(found: Findings) -> Table:
         ("Sound", f"{can.get('audio_in', 0)} microphone(s), {can.get('audio_out', 0)} loudspeaker(s)"),
         ("Privacy mask", "yes" if can.get("privacy") else "no"),
         ("Answers", _times(found.latency_ms)),
+        ("Snapshots", _channels(can.get("snapshot_channels"))),
+        ("Motors", _delays(found.delays_s)),
         ("Clock", "not told" if found.clock_off_s is None else f"{found.clock_off_s:+.0f} s against this computer"),
     )
     for name, text in rows:
@@ -181,6 +183,19 @@ def _words(size: tuple[int, int] | None, picture: Mapping[str, Any]) -> list[str
 
 def _times(latency_ms: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {value:.0f} ms" for name, value in latency_ms.items())
+
+
+def _channels(good: list[int | None] | None) -> str:
+    """With which channels a snapshot was given."""
+    words = ["without a channel" if one is None else f"with channel {one}" for one in good or ()]
+    return ", ".join(words) or "none was given"
+
+
+def _delays(delays_s: Mapping[str, float]) -> str:
+    """As the reading tells it, so with the time that an answer takes."""
+    words = {"start": "starts to move {:.2f} s after the order", "stop": "stands {:.2f} s after the stop"}
+    told = [f"{key.partition('_')[0]} {words[key.partition('_')[2]].format(value)}" for key, value in delays_s.items()]
+    return "; ".join(told) or "not tried"
 
 
 def _speeds(found: Findings) -> Table:
