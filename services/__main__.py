@@ -30,6 +30,7 @@ app = typer.Typer(
 Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
 Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
 CONFIG = Path("config/apartment.yaml")
+CALIBRATION_S = 600.0
 STATUS_S = 1.0  # how long retained states may take to come
 out = Console(soft_wrap=True, highlight=False)
 err = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -191,6 +192,30 @@ def probe(
             raise ConfigError([f"{config}:1: cameras: expected {camera!r} there, or its address with --url"])
         target = command.configured(camera, known[f"camera-{camera}"].config)
     command.run(out, target, out_folder or Path(f"probe-{camera}"), yes_move=yes_move, json_only=json)
+
+
+calibrate = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
+app.add_typer(calibrate, name="calibrate")
+
+
+@calibrate.command(epilog="Example: apartment calibrate ptz ip1 --yes-move")
+def ptz(
+    camera: str,
+    yes_move: Annotated[bool, typer.Option("--yes-move", help="It may move; else the terminal is asked.")] = False,
+    config: Config = CONFIG,
+) -> None:
+    """Turn a camera with every speed and keep what that teaches: speeds, delays, accelerations, smallest step."""
+    from services.camera.ptz import command  # for this command alone
+
+    apartment = load(config, (f"camera-{camera}",))
+
+    def ordered() -> bool:
+        with client.connected(apartment.bus, (topics.CAMERA_ORDER_RESULT.filter,)) as bus:
+            result = bus.order(camera, "CalibratePtz", "True", timeout_s=CALIBRATION_S, tell=_tell_order)
+        return result.state == "done"
+
+    if not command.run(out, camera, apartment.state, ordered, yes_move=yes_move):
+        raise typer.Exit(1)
 
 
 def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:

@@ -28,6 +28,7 @@ from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.peers import mosquitto
 from services.runner import Runner
+from tests.camera import goal_figures
 
 MESSAGES = 20_000
 WINDOW = 500  # of the publisher
@@ -170,7 +171,23 @@ def main() -> None:
         table.add_row(figure.name, f"{figure.value:,.0f} {figure.unit}", f"{figure.floor:,.0f} {figure.unit}",
                       f"{figure.ratio:.2f}", f">= {figure.wanted}", figure.floor_is)  # fmt: skip
     Console().print(table)
-    given.json.write_text(json.dumps([{**asdict(figure), "ratio": figure.ratio} for figure in figures], indent=1))
+    moves = goal_figures.rows()
+    Console().print(goals_table(moves))
+    figured = [{**asdict(figure), "ratio": figure.ratio} for figure in figures]
+    given.json.write_text(json.dumps([*figured, *map(asdict, moves)], indent=1))
+
+
+def goals_table(moves: list[goal_figures.Row]) -> Table:
+    """The camera's moves."""
+    title = "random goals of the camera in virtual time (no frame rate to keep): time over the motors' least time"
+    table = Table("firmware", "goals", "median s", "median ratio", "wanted", "worst", "commands", "most", "over 12",
+                  "requests each", "worst off", "pushed", title=title)  # fmt: skip
+    for row in moves:
+        table.add_row(row.name, str(row.goals), f"{row.seconds:.1f}", f"{row.ratio:.2f}",
+                      "" if row.bound is None else f"<= {row.bound}", f"{row.worst:.1f}", f"{row.commands:.0f}",
+                      str(row.most_commands), str(row.over), f"{row.requests:.2f}", f"{row.off:.2f} deg",
+                      str(row.pushed))  # fmt: skip
+    return table
 
 
 if __name__ == "__main__":

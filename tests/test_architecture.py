@@ -96,7 +96,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),
     "typer": ("services.__main__",),
-    "rich": ("services.__main__", "services.demo", "services.camera.probe."),
+    "rich": ("services.__main__", "services.camera.ptz.command", "services.demo", "services.camera.probe."),
     "starlette": ("services.dashboard.http",),
     "uvicorn": ("services.dashboard.http",),
     "pytest": ("services.pytest_plugin",),
@@ -106,11 +106,29 @@ DOORS: dict[str, tuple[str, ...]] = {
 }
 
 # Pure: what decides has no clock and does no input or output.
+MOVING = (
+    "calibrate",
+    "course",
+    "drive",
+    "driving",
+    "goal",
+    "helm",
+    "leg",
+    "move",
+    "pace",
+    "skill",
+    "stand",
+    "turning",
+    "zooming",
+)
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
-    "services.bus", "services.vision.", "services.camera.ptz.move", "services.camera.scan.search",
+    "services.bus", "services.vision.", *(f"services.camera.ptz.{part}" for part in MOVING),
+    "services.camera.scan.search",
     "services.camera.video.timing",
-    "services.camera.brands.dahua.", "services.camera.probe.findings", "services.camera.probe.anonymous",
+    "services.camera.brands.dahua.", "services.camera.alarm.motion", "services.camera.sound.g711",
+    "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
+    "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules",
     "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
     "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",

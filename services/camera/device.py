@@ -144,7 +144,7 @@ class Lane:
     def _send(self, request: Request) -> object:
         if isinstance(request, Start | FIRMWARE):
             self.started = True  # before it is sent: a start whose answer is lost may have been heard
-            self._drives, self._driven = isinstance(request, FIRMWARE), None
+            self._drives, self._driven = isinstance(request, FIRMWARE) and not isinstance(request, TurnFor), None
             self.turning(request.direction if isinstance(request, Start) else DRIVE)
         result = self.camera.send(request)
         if isinstance(request, Stop) or (isinstance(result, Reading) and self._has_driven(result)):

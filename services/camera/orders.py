@@ -121,7 +121,12 @@ class Restart:
     """Reboot the camera."""
 
 
-Motor = GotoPlace | LookAt | MoveBy | ScanFor
+@dataclass(frozen=True)
+class Calibrate:
+    """Learn the motors: turn with every speed."""
+
+
+Motor = GotoPlace | LookAt | MoveBy | ScanFor | Calibrate
 Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Broadcast | Restart  # all but its motors
 Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Itself
 
@@ -232,6 +237,12 @@ def _routine(value: Any) -> Command:
     return Routine(None if isinstance(value, str) and value.strip().lower() == "auto" else _names(value))
 
 
+def _calibrate(value: Any) -> Command:
+    if not _flag(value):
+        raise ValueError("expected True; Move Stop ends it")
+    return Calibrate()
+
+
 def _restart(value: Any) -> Command:
     if not _flag(value):
         raise ValueError("expected True: a reboot cannot be taken back")
@@ -259,6 +270,7 @@ READERS: dict[str, Callable[[Any], Command]] = {
     "AudioRec": lambda value: RecordSound.read(_text(value)),
     "AudioPlay": lambda value: PlaySound.read(_text(value)),
     "Reboot": _restart,
+    "CalibratePtz": _calibrate,
 }
 KEYS = {name.lower(): (name, reader) for name, reader in READERS.items()}
 

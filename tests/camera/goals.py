@@ -191,3 +191,8 @@ def outcomes(profile: Profile, goals: Iterable[Goal], seed: int = 1) -> list[Out
 def named() -> dict[str, Profile]:
     """Every profile that the simulator has."""
     return {name: replace(profile) for name, profile in PROFILES.items()}
+
+
+def positions(profile: Profile) -> bool:
+    """Whether it lets its firmware drive to a position."""
+    return profile.position_abs == "full" or profile.moves == "readings"

@@ -193,7 +193,9 @@ class Motors:
             case MoveTo(pan, tilt, zoom):
                 if self.absolute == "no":
                     return None, Refused("bad request")
-                self._drive_to(pan, tilt + self.tilt_off if self.absolute == "full" else self.tilt_now(), zoom)
+                self._drive_to(
+                    (180 - pan) % 360, tilt + self.tilt_off if self.absolute == "full" else self.tilt_now(), zoom
+                )
             case MoveOver():
                 return self._over(request)
             case TurnFor():

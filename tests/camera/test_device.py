@@ -6,8 +6,20 @@ import queue
 import threading
 
 from services.bus import Message
-from services.camera.device import Device
-from services.camera.requests import Away, Direction, Reading, Refused, Reply, Request, Snapshot, Start, Status, Stop
+from services.camera.device import DRIVE, Device, stand_still
+from services.camera.requests import (
+    Away,
+    Direction,
+    GotoPreset,
+    Reading,
+    Refused,
+    Reply,
+    Request,
+    Snapshot,
+    Start,
+    Status,
+    Stop,
+)
 
 WAIT_S = 5.0
 
@@ -112,3 +124,25 @@ def test_a_camera_that_is_lost_while_it_turns_is_owed_a_stop_until_one_has_arriv
     assert reply(inbox).error is None
     assert owed.get(timeout=WAIT_S) is False
     sender.close()
+
+
+def test_what_the_firmware_drives_by_itself_is_ended_by_a_start_that_can_be_stopped() -> None:
+    camera = Slow()
+    camera.leave.set()
+    assert stand_still(camera, lambda: 0.0, 1.0, direction=DRIVE)
+    assert camera.got[:2] == [Start(Direction.LEFT), Stop(direction=Direction.LEFT)]
+
+
+def test_the_watchdog_hears_of_a_drive_and_of_its_end() -> None:
+    told: list[object] = []
+    control, pictures = Slow(), Slow()
+    inbox: queue.Queue[Message] = queue.Queue()
+    each = iter((control, pictures))
+    sender = Device(lambda: next(each), inbox.put, turning=told.append)
+    control.leave.set()
+    for ticket, request in enumerate((GotoPreset(3), Status(), Status(), Status())):
+        sender.submit(request, ticket)
+        reply(inbox)
+    assert told == [DRIVE, None]
+    sender.close()
+    assert not any(isinstance(request, Stop) for request in control.got)

@@ -138,7 +138,8 @@ def test_a_move_ends_by_itself(flat: Flat) -> None:
 
 def test_the_same_move_again_prolongs_it(flat: Flat) -> None:
     flat.order("Move", "Left 3 1", order_id="a")
-    flat.run(1.2)
+    flat.until(flat.started)
+    flat.run(0.6)
     flat.order("Move", "Left 3 1", order_id="b")
     flat.until(lambda: flat.ended("a") and flat.ended("b"))
     assert (flat.states("a"), flat.states("b")) == (LIFE, LIFE)

@@ -25,6 +25,7 @@ BESIDE_DEG = 6.0  # farther from what was asked for, it was not honoured
 PLANE_DEG = 12.0  # the picture's plane is flat enough for so much
 PLANE_TAN = (1.0, 0.56)  # of the whole scale at the widest zoom, a guess to begin with
 LEAST_DEG = 0.3
+NOISE_DEG, NOISE_S = 0.2, 0.03  # of a reading on the way
 WITHIN_DEG = 0.1  # what is asked for stays so far from an end stop
 
 
@@ -43,6 +44,12 @@ def find(
 
     It may be asked for the very end of zoom's range, which is the one place where a digital zoom is exact.
     """
+    exact = any(skill.honours.get(form) == "yes" for form in ABSOLUTE)
+    near = None if exact else _preset(pose, aim, limits, {**presets, **skill.presets})
+    return near or _absolute(aim, limits, skill) or _over(pose, aim, skill)
+
+
+def _absolute(aim: Pose, limits: Limits, skill: Skill) -> Drive | None:
     for form in ABSOLUTE:
         if skill.honours.get(form, "unknown") in ("unknown", "yes"):
             pan, tilt = skill.beside.get(form, (0.0, 0.0))
@@ -50,14 +57,19 @@ def find(
                 min(high - WITHIN_DEG, max(low + WITHIN_DEG, aim[axis] - off))
                 for axis, off, (low, high) in zip((PAN, TILT), (pan, tilt), limits.ranges, strict=False)
             ]
-            return Drive(MoveTo(wanted[PAN] % 360.0, wanted[TILT], aim[ZOOM], form), aim)
+            to = (wanted[PAN] + pan, wanted[TILT] + tilt, aim[ZOOM])
+            return Drive(MoveTo(wanted[PAN] % 360.0, wanted[TILT], aim[ZOOM], form), to)
+    return None
+
+
+def _preset(pose: Pose, aim: Pose, limits: Limits, presets: Mapping[int, tuple[float, float, float]]) -> Drive | None:
     far = max(abs(aim[axis] - pose[axis]) for axis in (PAN, TILT))
-    for number, place in {**presets, **skill.presets}.items():
+    for number, place in presets.items():
         there = (limits.unwrap(place[PAN]), place[TILT], place[ZOOM])
         off = max(abs(there[axis] - aim[axis]) for axis in (PAN, TILT))
         if off <= PRESET_DEG and far > 2 * PRESET_DEG and abs(there[ZOOM] - aim[ZOOM]) <= PRESET_LEVELS:
             return Drive(GotoPreset(number), there)
-    return _over(pose, aim, skill)
+    return None
 
 
 def _over(pose: Pose, aim: Pose, skill: Skill) -> Drive | None:
@@ -110,7 +122,10 @@ def learn_on_the_way(skill: Skill, here: Pose, drive: Drive, begun: Reply, reply
         braking = pace.other(HALF_CHANGE) * pace.rate(1) ** 2
         if LEAST_DEG < travel < abs(way) - 1.5 * braking - 3.0:
             told = [Told(begun.received, begun.received - begun.sent - usual, 1)]
-            pace.learn(told, Seen(reply.sent, reply.received - reply.sent - usual, travel, 0.3))
+            pace.learn(
+                told, Seen(reply.sent, reply.received - reply.sent - usual, travel, NOISE_DEG + NOISE_S * pace.rate(1))
+            )
+            pace.age()
 
 
 def judge(skill: Skill, here: Pose, drive: Drive, there: Pose) -> None:

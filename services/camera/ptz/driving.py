@@ -12,12 +12,12 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import Helm
 from services.camera.ptz.leg import NEAR_DEG
-from services.camera.ptz.pace import READ_LATE, READ_PART
+from services.camera.ptz.pace import READ_LATE
 from services.camera.requests import Reading, Refused, Reply, Request, Status
 
 MOST_DRIVES = 4  # in one move
 LOOKS = 15
-LONGEST_DOUBT_S = 0.06
+LONG_S = 2.0  # a drive that takes longer is looked at on the way, which costs no time
 
 
 class Driving:
@@ -34,7 +34,7 @@ class Driving:
         aim = (self.helm.aim[PAN], self.helm.aim[TILT], self.helm.goal.pose[ZOOM])
         while self.helm.zoom_ends is None and self.drives < MOST_DRIVES:
             way = own.find(here, aim, self.helm.limits, self.helm.skill, self.presets)
-            if way is None or way.request in self.tried or (self.drives and not own.honoured(self.helm.skill, way)):
+            if way is None or way.request in self.tried or (self.drives > 1 and not own.honoured(self.helm.skill, way)):
                 break
             self.drives += 1
             self.tried.append(way.request)
@@ -51,19 +51,21 @@ class Driving:
         now = begun.received
         arrives = now + own.longest(self.helm.skill, here, way.to)
         known = all(one.known(1) for one in self.helm.skill.drives[:2])
-        if not known and arrives - now > 3 * self.helm.skill.timing.usual:
+        if arrives - now > (LONG_S if known else 3 * self.helm.skill.timing.usual):
             now = yield from wait(now + 0.6 * (arrives - now) - self.helm.skill.timing.usual)
             reply = yield from self.helm.send(Status())
             now, seen = reply.received, self.helm.limits.pose(cast(Reading, reply.result))
             own.learn_on_the_way(self.helm.skill, here, way, begun, reply, seen)
             arrives = begun.received + own.longest(self.helm.skill, here, way.to)
         timing = self.helm.skill.paces[PAN]
-        late = timing.other_doubt(READ_LATE) + 0.5 * timing.other(READ_PART) * self.helm.skill.timing.spread
-        now = yield from wait(max(now, arrives - timing.other(READ_LATE) + min(LONGEST_DOUBT_S, late)))
+        look_at = arrives - timing.other(READ_LATE) + self.helm.skill.arrives_late
+        now = yield from wait(max(now, look_at))
         before: Reading | None = None
-        for _ in range(LOOKS):
+        for look in range(LOOKS):
             reply = yield from self.helm.send(Status())
             reading = cast(Reading, reply.result)
+            if look == 0 and own.certain(self.helm.skill, way):
+                self.helm.skill.expect_arrival(there=self._there(reading, way))
             if self._there(reading, way) or (before is not None and same(before, reading)):
                 break
             before = reading

@@ -9,6 +9,7 @@ from services.camera.bulletin import Bulletin
 from services.camera.orders import GotoPlace, LookAt
 from services.camera.places import Places
 from services.camera.plan import Plan
+from services.camera.ptz.calibrate import calibrate
 from services.camera.ptz.goal import Goal, Pose
 from services.camera.ptz.kept import Kept
 from services.camera.ptz.move import Arrival, goto
@@ -55,6 +56,15 @@ class Errands:
             arrival = yield from goto(
                 self.goal(command), self.config.limits, self.skill, until, near=near, presets=self._presets()
             )
+        finally:
+            self.kept.save(self.skill)
+        self.bulletin.rests(arrival.reading, arrival.at)
+        return arrival
+
+    def calibrate(self) -> Plan[Arrival]:
+        """Learns the motors on purpose."""
+        try:
+            arrival = yield from calibrate(self.config.limits, self.skill)
         finally:
             self.kept.save(self.skill)
         self.bulletin.rests(arrival.reading, arrival.at)

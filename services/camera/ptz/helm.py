@@ -16,7 +16,7 @@ from services.camera.requests import Direction, Reading, Reply, Request, Start, 
 EDGES: Pose = (EDGE_DEG, EDGE_DEG, 0.3)  # how far from the ends of its range each axis stays
 COARSE_EDGE = 0.25  # of a step of zoom's reading, where that is coarse
 ODD_DEG = 0.4  # a reading farther from what was reckoned may not be of a camera at rest
-LATE_DOUBT_S = 0.06  # the age of readings is not known well: two equal ones, then
+LATE_DOUBT_S = 0.15  # the age of readings is not known well: two equal ones, then
 LONGEST_DOUBT_S = 0.35
 EARLY = 0.4  # of what zoom has before it, at most, is given up for not knowing its rate
 FOREVER = 1e12

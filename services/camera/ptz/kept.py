@@ -41,6 +41,8 @@ class _Kept(BaseModel):
     took: list[float]
     count: int
     worst: float
+    surprise: float
+    arrives_late: float
     diagonals: bool
     zoom_steps: list[float]
     honours: dict[str, Honours]
@@ -80,13 +82,27 @@ class Kept:
             log.warning("what was learnt of the motors is not kept: %s", error)
 
     def _read(self) -> _Kept | None:
-        if self.file is None or not self.file.exists():
-            return None
-        try:
-            return _Kept.model_validate_json(self.file.read_text(encoding="utf-8"))
-        except (OSError, ValidationError, UnicodeDecodeError) as error:
-            log.warning("%s cannot be read, the motors are learnt anew: %s", self.file, str(error)[:200])
-            return None
+        return _read(self.file) if self.file is not None else None
+
+
+def recalled(folder: Path, camera: str) -> Skill | None:
+    """What is kept of a camera, whichever it is; None when nothing is."""
+    kept = _read(folder / "cameras" / f"{camera}.json")
+    if kept is None:
+        return None
+    skill = Skill(picture=kept.picture)
+    _take_in(kept, skill)
+    return skill
+
+
+def _read(file: Path) -> _Kept | None:
+    if not file.exists():
+        return None
+    try:
+        return _Kept.model_validate_json(file.read_text(encoding="utf-8"))
+    except (OSError, ValidationError, UnicodeDecodeError) as error:
+        log.warning("%s cannot be read, the motors are learnt anew: %s", file, str(error)[:200])
+        return None
 
 
 def _kept(identity: Identity, skill: Skill) -> _Kept:
@@ -100,6 +116,8 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
         took=list(skill.timing.took),
         count=skill.timing.count,
         worst=skill.timing.worst,
+        surprise=skill.surprise,
+        arrives_late=skill.arrives_late,
         diagonals=skill.diagonals,
         zoom_steps=skill.zoom_steps,
         honours=skill.honours,
@@ -125,5 +143,6 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
     if kept.took:
         skill.timing.learn(kept.took[-1])
     skill.timing.count, skill.timing.worst = kept.count, kept.worst
+    skill.surprise, skill.arrives_late = kept.surprise, kept.arrives_late
     skill.diagonals, skill.zoom_steps, skill.honours = kept.diagonals, kept.zoom_steps, kept.honours
     skill.beside, skill.presets, skill.planes = kept.beside, kept.presets, kept.planes

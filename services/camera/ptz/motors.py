@@ -14,6 +14,7 @@ from services.camera.answers import Answers, Job
 from services.camera.orders import Command, MoveBy, ScanFor
 from services.camera.plan import Plan, Run, Stage
 from services.camera.ptz.move import Arrival
+from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import Hold, halt, stop
 from services.camera.requests import Refused
 from services.payloads import OrderState
@@ -34,6 +35,7 @@ class Motors:
         self.ended = ended
         self.jobs: list[Job] = []  # the order that runs, and those that prolong it
         self.hold: Hold | None = None
+        self.skill: Skill | None = None  # what is known of them
         self._run: Run | None = None
         self._halting: Run | None = None
         self._next: Job | None = None
@@ -116,7 +118,7 @@ class Motors:
 
     def _plan(self, command: Command, now: float) -> Plan[Any]:
         if isinstance(command, MoveBy):
-            self.hold = Hold(command.direction, command.speed, command.seconds)
+            self.hold = Hold(command.direction, command.speed, command.seconds, self.skill)
             return self.hold.plan()
         return self.make_plan(command, now)
 

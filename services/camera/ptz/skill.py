@@ -19,6 +19,7 @@ LATENCY_S, SPREAD_S = 0.3, 0.1  # of an answer, before any was measured
 TAIL_S = 1.0  # an answer may come so much later than usual, until experience says otherwise
 EXPERIENCE = 150  # answers without a late one that make a tail half as likely
 FORGETS, WORSE = 0.998, 1.2  # of the latest answer: kept with each one more; and it may be later the next time
+SOONER_S, LATER_S, MOST_LATE_S = 0.008, 0.04, 0.5
 GRIDS = (2.0, 1.0)  # some firmware tells zoom in coarse steps
 
 
@@ -73,6 +74,7 @@ class Skill:
     zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
     drives: tuple[Pace, Pace, Pace] = field(default_factory=lambda: tuple(Pace((top,)) for top in DRIVES))  # type: ignore[assignment]
+    arrives_late: float = 0.02  # s after it is reckoned there, to look whether a drive has ended
     honours: dict[str, Honours] = field(default_factory=dict)  # by form
     beside: dict[str, tuple[float, float]] = field(default_factory=dict)  # by form: pan and tilt off what was asked
     presets: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # readings where each was seen to be
@@ -83,6 +85,11 @@ class Skill:
         self.picture = (flip, mirror)
         self.senses[0].sign, self.senses[0].sure = (1 if mirror else -1), False
         self.senses[1].sign, self.senses[1].sure = (1 if flip else -1), False
+
+    def expect_arrival(self, *, there: bool) -> None:
+        """The first look at a drive's end: a little sooner the next time, or later; about one in six comes too soon."""
+        change = -SOONER_S if there else LATER_S
+        self.arrives_late = min(MOST_LATE_S, max(-SOONER_S * 10, self.arrives_late + change))
 
     def see_zoom(self, reading: float, ends: tuple[float, float]) -> None:
         """Takes in a reading of zoom: whether they come in steps shows between the ends."""

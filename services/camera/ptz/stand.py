@@ -9,11 +9,15 @@ from typing import cast
 
 from services.camera.device import same
 from services.camera.plan import Plan, ask, attempt, wait
-from services.camera.requests import BadLogin, Direction, Locked, Reading, Refused, Reply, Start, Status, Stop
+from services.camera.ptz.skill import Skill
+from services.camera.requests import BadLogin, Direction, Locked, Reading, Refused, Reply, Start, Status, Stop, TurnFor
 from services.errors import DeviceError
 
 GAP_S = 0.45  # between two readings that are compared: the slowest speed shows in that time
 REFUSALS = 3
+GRACE_S = 1.0  # a timed move ends so much later than our stop, which is to end it
+LEAST_SHARE = 4  # of 100: less is ignored
+TIMED = "Continuously"
 LOCKED_PAUSE_S = 60.0  # a camera that takes no login takes no stop either, and each try may lock the account
 
 
@@ -75,8 +79,9 @@ def halt(now: float, *, every: bool = False) -> Plan[Reading]:
 class Hold:
     """A motion by hand for some seconds from the moment that it is confirmed; the end can be put off while it runs."""
 
-    def __init__(self, direction: Direction, speed: int, seconds: float) -> None:
+    def __init__(self, direction: Direction, speed: int, seconds: float, skill: Skill | None = None) -> None:
         self.direction = direction
+        self.skill = skill
         self.speed = speed
         self.seconds = seconds
         self.until: float | None = None
@@ -88,14 +93,45 @@ class Hold:
             self.until = max(self.until, now + seconds)
 
     def plan(self) -> Plan[Reading]:
-        """Starts, waits, stops, and returns where it came to rest."""
-        reply = yield from ask(Start(self.direction, self.speed, self.speed))
-        now = reply.received
+        """Starts, waits, stops, and returns where it came to rest.
+
+        Where the firmware has timed moves they bound the motion too: it ends although no stop gets through any more.
+        """
+        now = (yield from self._start(self.seconds)).received
         self.until = now + self.seconds
+        ends = self.until + GRACE_S
         while now < self.until:
+            if self.until + GRACE_S > ends + 0.1:  # prolonged
+                now = (yield from self._start(self.until - now)).received
+                ends = self.until + GRACE_S
             if self.until - now > 1.0:
                 now = (yield from ask(Status())).received
             now = yield from wait(min(self.until, now + 0.4))
         yield from stop(now)
         reading, _ = yield from settle()
         return reading
+
+    def _start(self, seconds: float) -> Plan[Reply]:
+        timed = self._timed(seconds)
+        if self.skill is not None and timed is not None:
+            reply = yield from attempt(timed)
+            if reply.error is None:
+                self.skill.honours[TIMED] = "yes"
+                return reply
+            if not isinstance(reply.error, Refused):
+                raise reply.error
+            self.skill.honours[TIMED] = "no"
+        if self.until is not None:  # it runs already, and only our stop ends it
+            return (yield from ask(Status()))
+        return (yield from ask(Start(self.direction, self.speed, self.speed)))
+
+    def _timed(self, seconds: float) -> TurnFor | None:
+        """The same as a timed move; None where the firmware has none."""
+        if self.skill is None or self.skill.honours.get(TIMED, "unknown") not in ("unknown", "yes"):
+            return None
+        parts = []
+        for way, pace in zip(self.direction.value, self.skill.paces, strict=True):
+            speed = min(self.speed, len(pace.guess))
+            share = 100 * pace.rate(speed) / pace.rate(len(pace.guess))
+            parts.append(way * min(100, max(LEAST_SHARE, round(share))))
+        return TurnFor(parts[0], parts[1], parts[2], round(seconds + GRACE_S, 1))

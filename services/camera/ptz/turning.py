@@ -18,13 +18,14 @@ from services.camera.requests import Reading, Refused, Status
 RUNGS = 6  # legs without a rest between them
 RECKONED_DEG = 0.3
 FEW_COMMANDS = 3  # after so many, accuracy goes before time
-DEARER = 0.5  # each command more makes a correction so much dearer
+DEARER = 0.7  # each command more makes a correction so much dearer
 MANY_COMMANDS = 7  # after so many, a look has to be worth more
 ENOUGH_DEG = 0.2  # doubt about the place of an end that needs no look
 PROBE_DEG_S = 9.0
 PROBE_S = 0.35  # seen in the readings, and harmless the wrong way
 MOVED_DEG = 0.3
-LOOKS = 3  # readings in a leg
+PROBE_LOOKS = 3
+LOOKS = 2  # readings in a leg
 
 
 class Turning:
@@ -170,7 +171,7 @@ class Turning:
             speed = max((speed for speed in pace.speeds if pace.guess[speed - 1] <= most), default=1)
             levels[axis] = speed * (1 if self.helm.aim[axis] > here else -1)
         now = (yield from self.helm.start((levels[0], levels[1], levels[2]))).received
-        for _ in range(LOOKS):
+        for _ in range(PROBE_LOOKS):
             now = yield from wait(now + PROBE_S)
             reply = yield from self.helm.send(Status())
             now, reading = reply.received, cast(Reading, reply.result)

@@ -7,13 +7,33 @@ from __future__ import annotations
 
 from typing import cast
 
-from services.camera.plan import Plan, wait
+from services.camera.plan import Plan, ask, wait
 from services.camera.ptz.course import ZOOM
+from services.camera.ptz.goal import Limits
 from services.camera.ptz.helm import Helm, sign
-from services.camera.requests import Reading, Status
+from services.camera.ptz.skill import Skill
+from services.camera.ptz.stand import stop
+from services.camera.requests import Direction, Reading, Start, Status
 
 NEAR_LEVELS = 0.5
+WIDE_LEVELS, HELD_S = 0.05, 0.2
 LOOKS = 3  # readings while it turns
+
+
+def widest(limits: Limits, skill: Skill, now: float) -> Plan[float]:
+    """Makes sure that zoom is at its very widest, where a place in the picture can be reckoned; mostly it is.
+
+    A move leaves it a little before the end, where its coarse reading says the same. A digital zoom has no end stop to
+    be pushed against, so it is held there a moment longer than it needs.
+    """
+    low = limits.zoom[0]
+    if skill.zoomed is None or skill.zoomed[1] <= low + WIDE_LEVELS:
+        return now
+    way = (skill.zoomed[1] - low) / skill.paces[ZOOM].rate(1)
+    begun = yield from ask(Start(Direction.ZOOM_OUT))
+    now = (yield from stop((yield from wait(begun.received + 1.5 * way + HELD_S)))).received
+    skill.zoomed = (low, low)
+    return now
 
 
 class Zooming:

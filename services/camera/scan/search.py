@@ -15,6 +15,7 @@ from services.camera.plan import Plan, ask, attempt, wait
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
+from services.camera.ptz.zooming import widest
 from services.camera.requests import Away, Reading, Snapshot
 from services.camera.scan.analysis import Analysed
 from services.camera.scan.sightings import Sighting, between
@@ -72,6 +73,7 @@ class Scan:
     move_timeout_s: float = 60.0
     take: Take = snapshot
     place: str | None = None
+    near: Reading | None = None  # of the place before, where nothing has moved it since
     taken: list[Frame] = field(default_factory=list)
     analysed: int = 0
     seen: dict[int, list[Sighting]] = field(default_factory=dict)
@@ -138,8 +140,12 @@ class Scan:
 
     def _visit(self, place: Place, now: float, look: Look) -> Plan[float]:
         goal = self.limits.goal(place.pan, place.tilt, self.limits.zoom[0])
-        arrival = yield from goto(goal, self.limits, self.skill, now + self.move_timeout_s)
-        now = yield from wait(arrival.at + self.settle_s)
+        until, preset = now + self.move_timeout_s, place.preset
+        presets = {} if preset is None else {preset: (place.pan, place.tilt, place.zoom)}
+        arrival = yield from goto(goal, self.limits, self.skill, until, near=self.near, presets=presets)
+        self.near = arrival.reading
+        now = yield from widest(self.limits, self.skill, arrival.at)
+        now = yield from wait(now + self.settle_s)
         for _ in range(self.frames):
             jpeg, at, now = yield from self.take(arrival.at, now)
             frame = Frame(len(self.taken), self.place or "", arrival.reading, at)

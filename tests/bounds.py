@@ -1,0 +1,10 @@
+"""The bounds that the camera's moves are held to: by the test over all firmware profiles, and printed by the bench."""
+
+from __future__ import annotations
+
+GOALS = 50  # at random in pan, tilt and zoom, on both sides of the dead arc, one after the other from a cold start
+OFF_DEG = 0.5  # the truth, when `done` is said
+MEDIAN_START_STOP = 2.0  # time over the least time of the motors, where the camera takes only start and stop
+MEDIAN_POSITIONS = 1.3  # where it honours an absolute position
+COMMANDS = 12  # for a goal, answers to login challenges not counted
+LEARNING = 5  # goals until the motors are known; before that a goal may take more commands

@@ -1,0 +1,97 @@
+"""The rows of `make bench` about the camera's moves: ours on every firmware, and the report's controller beside it.
+
+Virtual time, on the same wire words and the same simulated motors: no frame rate to keep, and seconds of real time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from statistics import median
+
+import httpx
+
+from services.simulators.camera.firmwares import PROFILES
+from tests import bounds
+from tests.camera.goals import LIMITS, START, Outcome, Rig, constants, outcomes, positions, random_goals
+from tests.camera.least_time import least_time
+from tests.camera.report_controller import ReportController
+
+SEED = 1
+COMPARED = "ip3m-941w-2019"
+THE_REPORT_S_GOALS = 10
+
+
+@dataclass
+class Row:
+    """Many goals on one firmware."""
+
+    name: str
+    goals: int
+    seconds: float
+    ratio: float
+    worst: float
+    commands: float
+    most_commands: int
+    over: int
+    requests: float
+    off: float
+    pushed: int
+    bound: float | None
+
+
+def rows() -> list[Row]:
+    """Every firmware, and the report's controller on one of them."""
+    goals = random_goals(bounds.GOALS, SEED)
+    found = {name: outcomes(profile, goals, SEED) for name, profile in PROFILES.items()}
+    bound = {
+        name: bounds.MEDIAN_POSITIONS if positions(profile) else bounds.MEDIAN_START_STOP
+        for name, profile in PROFILES.items()
+    }
+    ours = [_row(name, one, bound[name]) for name, one in found.items()]
+    few = _row(f"{COMPARED}, the first {THE_REPORT_S_GOALS}", found[COMPARED][:THE_REPORT_S_GOALS], bound[COMPARED])
+    return [*ours, few, _row(f"{COMPARED}, the report's controller", the_report_s(), None)]
+
+
+def the_report_s() -> list[Outcome]:
+    """The report's controller on the first of the goals."""
+    rig, found = Rig(PROFILES[COMPARED], SEED), []
+    rig.wire.now = rig.now
+
+    def wait(seconds: float) -> None:
+        rig.wire.now += seconds
+
+    address = "http://192.0.2.9"
+    with httpx.Client(base_url=address, transport=rig.wire, auth=httpx.DigestAuth("ros", "secret123")) as http:
+        controller = ReportController(http, wait)
+        for goal in random_goals(bounds.GOALS, SEED)[:THE_REPORT_S_GOALS]:
+            rig.now = rig.wire.now
+            here, began, pushed = rig.truth(), rig.now, rig.pushed()
+            rig.wire.commands = rig.wire.requests = 0
+            controller.go(*goal)
+            rig.now = rig.wire.now
+            there = rig.truth()
+            off = max(abs(LIMITS.unwrap(there[0]) - LIMITS.unwrap(goal[0])), abs(there[1] - goal[1]))
+            least = least_time(here, goal, constants(rig.profile))
+            counts = rig.wire.commands, rig.wire.requests
+            rests = not any(rig.device.motion(rig.now)[1])
+            found.append(Outcome(goal, rig.now - began, least, *counts, off, 0.0, rests, rig.pushed() - pushed))
+    assert rig.now > START
+    return found
+
+
+def _row(name: str, found: list[Outcome], bound: float | None) -> Row:
+    commands = [one.commands for one in found]
+    return Row(
+        name=name,
+        goals=len(found),
+        seconds=median(one.seconds for one in found),
+        ratio=median(one.ratio for one in found),
+        worst=max(one.ratio for one in found),
+        commands=median(commands),
+        most_commands=max(commands),
+        over=sum(count > bounds.COMMANDS for count in commands),
+        requests=sum(one.requests for one in found) / sum(commands),
+        off=max(one.off for one in found),
+        pushed=sum(one.pushed > 0 for one in found),
+        bound=bound,
+    )

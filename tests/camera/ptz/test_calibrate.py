@@ -1,0 +1,44 @@
+"""Learning the motors on purpose, as an order: every speed is known afterwards, and kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from services.camera.ptz.kept import recalled
+from tests.camera.flat import Flat
+from tests.camera.motors import PAN, Motors
+
+
+@pytest.fixture
+def flat(tmp_path: Path) -> Flat:
+    return Flat(tmp_path, motors=Motors(acceleration=120.0, faster=1.3), state=tmp_path / "state").online()
+
+
+def test_every_speed_is_known_afterwards_and_kept(flat: Flat, tmp_path: Path) -> None:
+    before = flat.motors.pose
+    flat.order("CalibratePtz", "True")
+    flat.until(flat.ended, 300.0)
+    assert flat.last()["state"] == "done", flat.last()
+    skill = recalled(tmp_path / "state", "ip1")
+    assert skill is not None
+    for speed, rate in enumerate(PAN, start=1):
+        assert skill.paces[0].rate(speed) == pytest.approx(1.3 * rate, rel=0.08)
+    assert flat.motors.pushed == 0.0
+    assert not flat.motors.moving
+    assert abs((flat.motors.pose[0] - before[0] + 180) % 360 - 180) <= 0.5
+
+
+def test_it_can_be_stopped(flat: Flat) -> None:
+    flat.order("CalibratePtz", "True", order_id="a")
+    flat.run(8)
+    flat.order("Move", "Stop", order_id="b")
+    flat.until(lambda: flat.ended("a") and flat.ended("b"))
+    assert flat.states("a")[-1] == "cancelled"
+    assert not flat.motors.moving
+
+
+def test_it_is_not_begun_by_a_no(flat: Flat) -> None:
+    flat.order("CalibratePtz", "False")
+    assert flat.last()["state"] == "refused"
