@@ -197,7 +197,8 @@ def without_cgi(camera: simulated.Simulated) -> Iterator[str]:
             kept = {
                 key: value for key, value in self.headers.items() if key.lower() in ("authorization", "content-type")
             }
-            return self.answer(httpx.request(self.command, camera.url + self.path, content=body, headers=kept))
+            there = camera.url + self.path
+            return self.answer(httpx.request(self.command, there, content=body, headers=kept, timeout=30.0))
 
         do_POST = do_GET  # noqa: N815 (the base class looks for these names)
 

@@ -24,7 +24,8 @@ WORDS: dict[str, tuple[str, dict[object, str]]] = {  # switch -> what it is, and
                           "flaky": "works again at times: about one and a half requests per command"}),
     "challenge_spacing": ("Challenge", {"compact": "without spaces", "spaced": "with spaces"}),
     "digest_algorithms": ("Digest with", {}),
-    "error_style": ("It says no by", {"200-error": "200 and the word Error", "400-body": "400", "501": "501"}),
+    "error_style": ("It says no by", {"200-error": "status 200 and the word Error", "400-body": "status 400",
+                                      "501": "status 501"}),
     "brackets": ("[0] in a request", {"both": "plain or encoded", "raw": "plain only", "encoded": "encoded only"}),
     "config_narrowing": ("Parts of tables", {True: "can be asked for", False: "come empty: whole tables only"}),
     "daynight": ("Day and night in", {}),
@@ -144,10 +145,14 @@ def report(console: Console, found: Findings) -> None:
     for switch, (name, _) in WORDS.items() if found.brand == "amcrest" else ():
         unsure = switch in found.unknown
         text = f"not found out: {found.unknown[switch]}" if unsure else meaning(switch, found.switches)
+        if switch == "position_abs" and (beside := found.switches.get("position_abs_tilt_off")):
+            text += f", but tilt ends {beside:+.1f}° beside"
         table.add_row(name, Text(text, "dim" if unsure or text == "not found out" else ""))
     if table.rows:
+        console.print()
         console.print(table)
     if found.speeds:
+        console.print()
         console.print(_speeds(found))
     for note in found.notes:
         console.print(f"Note: {note}.", markup=False)
@@ -169,7 +174,10 @@ def _head(found: Findings) -> Table:
         ("Answers", _times(found.latency_ms)),
         ("Snapshots", _channels(can.get("snapshot_channels"))),
         ("Motors", _delays(found.delays_s)),
-        ("Clock", "not told" if found.clock_off_s is None else f"{found.clock_off_s:+.0f} s against this computer"),
+        (
+            "Clock",
+            "not told" if found.clock_off_s is None else f"{found.clock_off_s + 0.0:+.1f} s against this computer",
+        ),
     )
     for name, text in rows:
         table.add_row(Text(name, "dim"), Text(text))
@@ -193,9 +201,10 @@ def _channels(good: list[int | None] | None) -> str:
 
 def _delays(delays_s: Mapping[str, float]) -> str:
     """As the reading tells it, so with the time that an answer takes."""
-    words = {"start": "starts to move {:.2f} s after the order", "stop": "stands {:.2f} s after the stop"}
-    told = [f"{key.partition('_')[0]} {words[key.partition('_')[2]].format(value)}" for key, value in delays_s.items()]
-    return "; ".join(told) or "not tried"
+    both = [axis for axis in ("pan", "tilt") if {f"{axis}_start", f"{axis}_stop"} <= set(delays_s)]
+    words = "{} moves {:.2f} s after the order, stands {:.2f} s after the stop"
+    told = [words.format(axis, delays_s[f"{axis}_start"], delays_s[f"{axis}_stop"]) for axis in both]
+    return "\n".join(told) or "not tried"
 
 
 def _speeds(found: Findings) -> Table:
