@@ -16,7 +16,7 @@ from services.camera.ptz.zooming import Zooming
 from services.camera.requests import Reading, Refused, Status
 
 RUNGS = 6  # legs without a rest between them
-RECKONED_DEG = 0.3
+RECKONED_DEG = 0.4
 FEW_COMMANDS = 3  # after so many, accuracy goes before time
 DEARER = 0.7  # each command more makes a correction so much dearer
 MANY_COMMANDS = 7  # after so many, a look has to be worth more
