@@ -169,16 +169,19 @@ def small_flat(
         broker = broker_stack.enter_context(broker_of(folder, doors))
         master = stack.enter_context(ros.private(folder / "ros")) if with_ros else None
         config = Path(shutil.copytree(CONFIG, folder / "config")) / "small.yaml"
-        ports = {name: free_port() for name in doors}
+        ports, streams = ({name: free_port() for name in doors} for _ in range(2))
         networks = {name: stack.enter_context(network(ports[name])) for name in doors if networked}
         near = {name: networks[name].port if networked else ports[name] for name in doors}
         sections = {
             "bus": {"port": broker.port},
             "state": str(folder / "state"),
             "home": "home.yaml",
-            "cameras": {name: {**_camera(name, near[name], folder), **(camera or {})} for name in doors},
-            "simulators": {"cameras": {name: {**_simulator(ports[name], door), **(simulator or {})}
-                                       for name, door in doors.items()}},
+            "cameras": {
+                name: {**_camera(name, near[name], folder), "rtsp_port": streams[name], **(camera or {})}
+                for name in doors},
+            "simulators": {"cameras": {
+                name: {**_simulator(ports[name], door), "rtsp_port": streams[name], **(simulator or {})}
+                for name, door in doors.items()}},
             **({"bridge": {"rules": "bridge.yaml"}} if with_ros else {}),
         }  # fmt: skip
         config.write_text(yaml.safe_dump(sections))

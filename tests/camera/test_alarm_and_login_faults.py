@@ -89,6 +89,14 @@ def snapshot() -> Message:
     return Message("camera/ip1/snapshot/get", b"", received=time.time())
 
 
+def test_a_silent_event_stream_is_noticed_although_the_camera_is_well(here: Bench) -> None:
+    here.tell("fault", name="silent_events")
+    here.until(lambda: motion(here) == -1, NOTICED_S)
+    assert state(here) == "online"
+    here.tell("well")
+    here.until(lambda: motion(here) == 0, NOTICED_S)
+
+
 def test_a_slow_camera_stays_usable_and_its_latency_is_told(here: Bench) -> None:
     here.tell("fault", name="slow", seconds=1.0)
     for_a_while(here, 6.0)

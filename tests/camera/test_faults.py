@@ -12,7 +12,7 @@ from tests.small_flat import SmallFlat, small_flat
 
 pytestmark = pytest.mark.mosquitto
 SIMULATOR = {"latency_s": 0.1, "switches": {"boot_s": 4.0}}
-CAMERA = {"login_retry_s": 5.0}
+CAMERA = {"login_retry_s": 5.0, "stream": {"rtsp": True}}
 
 
 @pytest.fixture(scope="module")

@@ -55,7 +55,7 @@ class Amcrest:
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
         self.running: str | None = None  # the code of the motion that may be under way
-        self._in_day_night = False  # the firmware keeps the mode in VideoInDayNight
+        self._in_day_night: bool | None = None  # the firmware keeps the mode in VideoInDayNight; None: not known yet
 
     def close(self) -> None:
         """Ends the connection."""
@@ -159,6 +159,7 @@ class Amcrest:
     def _picture(self) -> Picture:
         options = self._get(picture.PICTURE_TABLE).text
         if "DayNightColor" in options:
+            self._in_day_night = False
             return picture.read_picture(options)
         try:
             modes = self._get(picture.MODE_TABLE).text
@@ -168,6 +169,8 @@ class Amcrest:
         return picture.read_picture(options, modes)
 
     def _set_picture(self, request: SetPicture) -> Picture:
+        if request.mode is not None and self._in_day_night is None:
+            self._picture()
         if request.flip is not None or request.mirror is not None or not self._in_day_night:
             self._command(picture.set_picture(request))
         if request.mode is not None and self._in_day_night:

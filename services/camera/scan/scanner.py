@@ -121,7 +121,7 @@ class Scanner:
     def _take(self) -> Take:
         """Where the frames come from."""
         video, lens = self.bulletin.video, self.eye.lens
-        if self.config.scan_pictures == "snapshot" or video is None or not video.flows:
+        if self.config.scan_pictures == "snapshot" or video is None or not video.timed:
             return snapshot
         return Streamed(video, lens.width / lens.height if lens else None)
 

@@ -36,7 +36,7 @@ class Streamed:
         """A frame exposed after that moment, and after the one before."""
         until = now + LONGEST_S
         with self.channel.newest.watched():
-            while now < until and self.channel.flows and not self._unfit:
+            while now < until and self.channel.timed and not self._unfit:
                 frame = self.channel.newest.frame
                 if frame is not None and frame.number > self._last and frame.exposure.after(after):
                     self._last = frame.number

@@ -54,10 +54,12 @@ class Channel:
         self.gate = gate
         self.clock = clock
         self.rtsp, self.mjpeg = settings.rtsp, settings.mjpeg
+        self.reachable: Callable[[], bool] = lambda: False  # the camera, as far as the service knows
         self.found: StreamAddress | None = None  # where the camera's moving picture is, when it has told
         self.newest = Newest(Upright(kind=kind), clock)
-        self.reader = Reader(camera, self.newest, settings.latency, clock)
+        self.reader = Reader(camera, self.newest, settings.latency, gate.book.retry_s, clock)
         self._proxy: Proxy | None = None
+        self._base = ""
         self.open()
 
     @property
@@ -69,6 +71,11 @@ class Channel:
     def flows(self) -> bool:
         """Whether pictures come by themselves now."""
         return self.on and bool(self.reader.flow.name) and not self._still(self.clock())
+
+    @property
+    def timed(self) -> bool:
+        """Whether it is known of each picture that flows when it was exposed."""
+        return self.flows and self.reader.flow.name == "rtsp"
 
     @property
     def hopeful(self) -> bool:
@@ -85,8 +92,7 @@ class Channel:
         """Where the stream is for others; empty while it is nowhere."""
         if self._proxy is None:
             return ""
-        base = (self.settings.url or self._own_url(self._proxy)).rstrip("/")
-        return f"{base}{self._proxy.stream_path}"
+        return f"{self._base}{self._proxy.stream_path}"
 
     @property
     def state(self) -> Stream:
@@ -141,10 +147,11 @@ class Channel:
         """What is wrong with the stream, or advice."""
         return self.trouble() or (ADVICE if self.on and self.reader.flow.queueing else "")
 
-    def ask(self) -> None:
-        """Any thread: somebody waits for a picture; one that flows comes without a snapshot."""
-        if not self.flows:
+    def ask(self) -> bool:
+        """Any thread: somebody waits for a picture; one that flows comes without a snapshot. False: none will come."""
+        if not self.flows and self.reachable():
             self.post(Message(ASKED))
+        return self.flows or self.reachable()
 
     def open(self) -> None:
         """Listens, if it does not yet; a port that is taken is told, and tried again when the stream is ordered."""
@@ -152,6 +159,7 @@ class Channel:
             return
         try:
             self._proxy = Proxy(self.camera, self.settings, self.newest, lambda: self.on, self.ask)
+            self._base = (self.settings.url or self._own_url(self._proxy)).rstrip("/")
         except OSError as error:
             log.error("%s: no stream at %s:%d: %s", self.camera, self.settings.host, self.settings.port, error)
 

@@ -38,6 +38,9 @@ class Feed:
         self.channel = channel
         self.upright = Upright(config.picture.flip, config.picture.mirror, config.kind)
         self.say = say
+        if channel is not None:
+            channel.newest.upright = self.upright
+            channel.reachable = lambda: health.online
         self._shooting = False
         self._motion = 0
 

@@ -107,9 +107,12 @@ class Newest:
         """The newest picture."""
         return self._frame
 
-    def fresh(self, age_s: float) -> bool:
-        """Whether the newest picture came that long ago at most."""
-        return self._frame is not None and self.clock() - self._frame.arrived <= age_s
+    def stale(self, age_s: float) -> int:
+        """The number up to which pictures are older than that: a newer one may be shown as how it is now."""
+        frame = self._frame
+        if frame is None:
+            return 0
+        return frame.number - 1 if self.clock() - frame.arrived <= age_s else frame.number
 
     def wait(self, number: int, timeout_s: float) -> Frame | None:
         """A picture newer than that number; None when none came in that time or there will be none."""

@@ -16,11 +16,13 @@ from services.camera.requests import Away
 
 Image = NDArray[np.uint8]
 QUALITY = 80  # of the JPEGs that we make
+END, LONGEST_TAIL = b"\xff\xd9", 4096  # bytes that firmware writes behind the end
 
 
 def decode(jpeg: bytes) -> Image:
-    """The picture as BGR (height, width, 3); Away when it is none (the camera sends broken ones at times)."""
-    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    """The picture as BGR (height, width, 3); Away when it is none, or not whole (the camera sends such at times)."""
+    whole = END in jpeg[-LONGEST_TAIL:]  # of half a JPEG OpenCV makes a picture that is grey below
+    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if whole else None
     if image is None:
         raise Away(f"expected a whole JPEG, got {len(jpeg)} bytes that are none")
     return image.astype(np.uint8, copy=False)

@@ -11,8 +11,10 @@ slow one nobody else's trouble; it skips pictures, because it takes the newest o
 from __future__ import annotations
 
 import logging
+import re
 import select
 import socket
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from http import HTTPStatus
@@ -32,8 +34,9 @@ STALLED_S = 10.0  # a viewer that takes nothing for so long is gone
 QUIET_S = 2.0  # between two looks whether a viewer is still there, while no picture comes
 SNAPSHOT_S = 22.0  # the camera may take 20 s
 FRESH_S = 2.0  # a picture as old as this is still the newest one
+STRANGERS = 4  # connections at once from addresses that may not look: they are told so, and keep nobody out
 SEND_BUFFER = 256 * 1024  # bytes; with more a slow viewer sees what was long ago
-POLL_S = 0.2  # how long the port may take to notice that it is to close
+POLL_S = 0.5  # how long the port may take to notice that it is to close
 STRICT = (
     ("Cache-Control", "no-store, no-cache, must-revalidate, max-age=0"),
     ("Pragma", "no-cache"),
@@ -46,7 +49,8 @@ log = logging.getLogger(__name__)
 
 
 class Proxy(ThreadingHTTPServer):
-    """The port. `on()`: whether the stream is switched on; `ask()` asks for a snapshot, which will come into the slot.
+    """The port. `on()`: whether the stream is switched on; `ask()` asks for a snapshot, which will come into the
+    slot; False when there is nobody to ask.
 
     OSError when it cannot listen there.
     """
@@ -55,7 +59,7 @@ class Proxy(ThreadingHTTPServer):
     request_queue_size = 32
 
     def __init__(
-        self, camera: str, settings: StreamSettings, newest: Newest, on: Callable[[], bool], ask: Callable[[], None]
+        self, camera: str, settings: StreamSettings, newest: Newest, on: Callable[[], bool], ask: Callable[[], bool]
     ) -> None:
         self.address_family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
         super().__init__((settings.host, settings.port), Viewer)
@@ -65,7 +69,8 @@ class Proxy(ThreadingHTTPServer):
         self.names = _own_names(settings)
         self.seats = BoundedSemaphore(settings.viewers)
         self.doors = BoundedSemaphore(2 * settings.viewers + 8)  # connections that have not said what they want, too
-        self._open: set[socket.socket] = set()
+        self.porch = BoundedSemaphore(STRANGERS)
+        self._open: dict[socket.socket, BoundedSemaphore] = {}
         self.closing = False
         self._thread = Thread(target=self.serve_forever, args=(POLL_S,), name="camera proxy", daemon=True)
         self._thread.start()
@@ -83,37 +88,35 @@ class Proxy(ThreadingHTTPServer):
 
     def knows(self, host: str) -> bool:
         """Whether a request's Host is us: a page elsewhere that gave its own name our address may not read pictures."""
-        name = (urlsplit(f"//{host}").hostname or "").rstrip(".")
+        if not host:
+            return True  # no browser
+        name = host.lower().rpartition(":")[0] if re.fullmatch(r".*:\d*", host) else host.lower()
+        name = name.rstrip(".")
         try:
-            ip_address(name)
+            ip_address(name.removeprefix("[").removesuffix("]"))
         except ValueError:
             return name in self.names
         return True
 
     def verify_request(self, request: Any, client_address: Any) -> bool:
         """More connections than there are doors are closed without a word."""
-        return self.doors.acquire(blocking=False)
+        entrance = self.doors if self.may_look(str(client_address[0])) else self.porch
+        if not entrance.acquire(blocking=False):
+            return False
+        self._open[request] = entrance
+        return True
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """One connection."""
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self.doors.release()
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Remembers the connection, so that it can be ended."""
-        self._open.add(request)
-        super().process_request(request, client_address)
-
-    def shutdown_request(self, request: Any) -> None:
-        """The connection is over."""
-        self._open.discard(request)
-        super().shutdown_request(request)
+            self._open.pop(request).release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A viewer that went away is none of our concern; anything else is a bug, and told."""
-        log.debug("a viewer at %s broke off", client_address[0], exc_info=True)
+        if not isinstance(sys.exception(), OSError):
+            log.exception("a viewer at %s could not be served", client_address[0])
 
     def close(self) -> None:
         """Ends the port and every viewer."""
@@ -143,7 +146,7 @@ class Viewer(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         """Looks."""
         self.close_connection = True
-        path = urlsplit(self.path).path
+        path = self.path.partition("?")[0]
         if not self.server.may_look(str(self.client_address[0])) or not self.server.knows(self.headers["Host"] or ""):
             self._refuse(HTTPStatus.FORBIDDEN, "this address may not look: see stream.allow in the configuration")
         elif path not in (self.server.stream_path, self.server.snapshot_path):
@@ -181,7 +184,7 @@ class Viewer(BaseHTTPRequestHandler):
     def _pictures(self) -> None:
         """The boundary follows each picture at once: a browser shows it when it knows where it ends."""
         self.wfile.write(f"--{BOUNDARY}\r\n".encode())
-        number, step, due = 0, 1 / self.server.settings.fps, monotonic()
+        number, step, due = self.server.newest.stale(FRESH_S), 1 / self.server.settings.fps, monotonic()
         while self.server.on() and not self.server.closing and not self._gone(max(0.0, due - monotonic())):
             found = self.server.newest.jpeg(number, QUIET_S)
             if found is None:
@@ -207,13 +210,11 @@ class Viewer(BaseHTTPRequestHandler):
 
     def _newest(self) -> bytes | None:
         newest = self.server.newest
-        frame = newest.frame
         with newest.watched():
-            if frame is None or not newest.fresh(FRESH_S):
-                self.server.ask()
-                found = newest.jpeg(frame.number if frame else 0, SNAPSHOT_S)
-            else:
-                found = newest.jpeg(frame.number - 1, SNAPSHOT_S)
+            number = newest.stale(FRESH_S)
+            if newest.wait(number, 0.0) is None and not self.server.ask():
+                return None
+            found = newest.jpeg(number, SNAPSHOT_S)
         return found[1] if found else None
 
     def _refuse(self, status: HTTPStatus, why: str, *more: tuple[str, str]) -> None:

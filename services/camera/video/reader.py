@@ -13,14 +13,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from threading import Condition, Thread
 
-from services.camera.requests import BadLogin, Locked
+from services.camera.requests import BadLogin
 from services.camera.video.newest import Newest
 from services.camera.video.session import Arrival, Session
 from services.camera.video.timing import Exposure, StreamClock
 from services.errors import DeviceError
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0
-LOGIN_PAUSE_S, LONGEST_LOGIN_S = 120.0, 1800.0  # each attempt may lock the account
+LONGEST_LOGIN_S = 1800.0  # each attempt may lock the account
 PATIENCE = 2  # failures of the best way before another one is tried
 BETTER_S = 300.0  # so long a worse way is used before the best one is tried again
 HOPELESS_S = 5.0  # a lag that a new connection takes away
@@ -55,11 +55,17 @@ class Reader:
     """`switch` it on and off; `flow` tells how it goes. `latency`: of the way and how sure that is, seconds."""
 
     def __init__(
-        self, name: str, newest: Newest, latency: tuple[float, float], clock: Callable[[], float] = time.time
+        self,
+        name: str,
+        newest: Newest,
+        latency: tuple[float, float],
+        login_retry_s: float = 120.0,
+        clock: Callable[[], float] = time.time,
     ) -> None:
         self.name = name
         self.newest = newest
         self.latency = latency
+        self.login_retry_s = login_retry_s
         self.clock = clock
         self.flow = Flow()
         self._ways: tuple[Opener, ...] = ()
@@ -145,8 +151,8 @@ class Reader:
 
     def _pause(self, error: DeviceError) -> None:
         first, longest = FIRST_PAUSE_S, LONGEST_PAUSE_S
-        if isinstance(error, BadLogin | Locked):
-            first, longest = LOGIN_PAUSE_S, LONGEST_LOGIN_S
+        if isinstance(error, BadLogin):
+            first, longest = max(error.again_s, self.login_retry_s), LONGEST_LOGIN_S
         pause = min(longest, first * 2 ** min(self.flow.failures - 1, 10))
         with self._changed:
             before = self._ways

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 OPEN_S, READ_S = 5.0, 4.0  # a stream that stands still is given up after READ_S
 LONGEST_GAP_S = 0.5  # between two pictures of a stream that runs
+LONGEST_BACKLOG = 32  # pictures that are decoded at once for a first look; with more the next keyframe is waited for
 LONGEST_GOP = 8 * 1024 * 1024  # bytes kept to begin with, when somebody starts to look between two keyframes
 OPTIONS = {
     "rtsp_transport": "tcp",  # over UDP lost packets are broken pictures
@@ -95,6 +96,8 @@ class Rtsp:
     def _decode(self) -> tuple[av.VideoFrame | None, bool]:
         """The picture of the newest packet, from the last keyframe on where those before are not decoded yet."""
         frame, broken = None, False
+        if len(self._gop) - self._decoded > LONGEST_BACKLOG:
+            return None, False
         for packet in self._gop[self._decoded :]:
             frame = None
             try:
@@ -130,7 +133,7 @@ def _open(url: str) -> av.container.InputContainer:
 def _translated(error: av.FFmpegError) -> DeviceError:
     """Never the error's own text: the address stands in it."""
     if isinstance(error, av.HTTPUnauthorizedError):
-        return BadLogin("the camera's stream does not know this user and password")
+        return BadLogin("the camera's stream does not know this user and password", 0.0)  # the reader knows how long
     if isinstance(error, av.HTTPNotFoundError | av.HTTPForbiddenError | av.HTTPBadRequestError):
         return Refused(f"the camera refuses the stream: {error.strerror}")
     if isinstance(error, av.ExitError):

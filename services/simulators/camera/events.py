@@ -101,6 +101,11 @@ class Events:
         with self._lock:
             self._listeners.remove(subscription)
 
+    @property
+    def listeners(self) -> int:
+        """How many listen."""
+        return len(self._listeners)
+
     def tell(self, code: str, action: str, index: int = 0, data: Data | None = None) -> None:
         """Something begins (`Start`), ends (`Stop`) or happens (`Pulse`)."""
         with self._lock:

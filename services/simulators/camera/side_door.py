@@ -47,6 +47,7 @@ def state(camera: CameraServer) -> dict[str, Any]:
         "booting": camera.device.booting(now),
         "presets": {number: name for number, (name, _) in camera.device.ptz.presets.items()},
         "door": camera.door.counters,
+        "listeners": camera.device.events.listeners,
         **camera.pictures.rates(),
     }
 

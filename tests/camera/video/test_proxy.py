@@ -46,7 +46,7 @@ class Studio:
     def stream(self) -> str:
         return f"http://127.0.0.1:{self.proxy.server_port}/camera/ip1/stream.mjpg"
 
-    def expose(self, size: tuple[int, int] = (240, 320)) -> int:
+    def expose(self, size: tuple[int, int] = (240, 320), ago: float = 0.0) -> int:
         number = next(self.numbers)
         image = picture(number, size)
 
@@ -54,7 +54,7 @@ class Studio:
             self.developed.append(number)
             return image
 
-        self.newest.put(develop, Exposure(time.time(), 0.1), time.time())
+        self.newest.put(develop, Exposure(time.time() - ago, 0.1), time.time() - ago)
         return number
 
     def get(self, path: str, method: str = "GET", host: str | None = None) -> tuple[int, dict[str, str], bytes]:
@@ -76,7 +76,7 @@ def settings() -> StreamSettings:
 def studio(settings: StreamSettings) -> Iterator[Studio]:
     newest, on, asked = Newest(Upright()), threading.Event(), list[float]()
     on.set()
-    proxy = Proxy("ip1", settings, newest, on.is_set, lambda: asked.append(time.time()))
+    proxy = Proxy("ip1", settings, newest, on.is_set, lambda: not asked.append(time.time()))
     before = threading.active_count()
     yield Studio(newest, proxy, on, asked)
     proxy.close()
@@ -118,16 +118,15 @@ def test_a_viewer_is_sent_each_picture_as_it_comes(studio: Studio) -> None:
 
 def test_one_encoding_serves_all_viewers_and_none_is_made_while_nobody_looks(studio: Studio) -> None:
     for _ in range(5):
-        studio.expose()
+        studio.expose(ago=3600)
     assert studio.developed == []
     looks = [Look(studio) for _ in range(3)]
-    for look in looks:
-        look.next()
+    wait_until(lambda: studio.newest.watchers == 3, "the viewers")
     for _ in range(4):
         studio.expose()
         for look in looks:
             look.next()
-    assert studio.developed == [5, 6, 7, 8, 9]
+    assert studio.developed == [6, 7, 8, 9]
     for look in looks:
         look.close()
     wait_until(lambda: not studio.newest.wanted, "the viewers' end to be noticed")
@@ -224,7 +223,7 @@ def test_a_page_elsewhere_that_calls_our_address_its_own_gets_no_picture(
 )
 def test_loopback_and_the_allowed_networks_may_look(allow: tuple[str, ...], address: str, may: bool) -> None:
     settings = StreamSettings.model_validate({"allow": allow})
-    proxy = Proxy("ip1", settings, Newest(Upright()), lambda: True, lambda: None)
+    proxy = Proxy("ip1", settings, Newest(Upright()), lambda: True, lambda: False)
     assert proxy.may_look(address) is may
     proxy.close()
 
@@ -234,7 +233,7 @@ def test_who_may_not_look_is_told_so() -> None:
         def may_look(self, address: str) -> bool:
             return super().may_look("192.0.2.7")
 
-    proxy = Elsewhere("ip1", StreamSettings(), Newest(Upright()), lambda: True, lambda: None)
+    proxy = Elsewhere("ip1", StreamSettings(), Newest(Upright()), lambda: True, lambda: False)
     studio = Studio(proxy.newest, proxy, threading.Event())
     status, _, body = studio.get("/camera/ip1/snapshot.jpg")
     assert (status, b"stream.allow" in body) == (403, True)
@@ -260,6 +259,15 @@ def test_a_snapshot_is_the_newest_picture_while_one_is_fresh(studio: Studio) -> 
     assert studio.get("/camera/ip1/snapshot.jpg", "HEAD")[2] == b""
 
 
+def test_what_was_long_ago_is_not_shown_as_how_it_is_now(studio: Studio) -> None:
+    studio.expose(ago=3600)
+    look = Look(studio)
+    wait_until(lambda: studio.newest.wanted, "the viewer")
+    number = studio.expose()
+    assert np.abs(pictures.decode(look.next()).astype(int) - picture(number)).mean() < 3
+    look.close()
+
+
 def test_a_snapshot_is_asked_for_when_no_picture_is_fresh_also_while_the_stream_is_off(studio: Studio) -> None:
     studio.on.clear()
     answers: list[int] = []
@@ -269,6 +277,31 @@ def test_a_snapshot_is_asked_for_when_no_picture_is_fresh_also_while_the_stream_
     studio.expose()
     viewer.join(10)
     assert answers == [200]
+
+
+def test_nobody_waits_for_a_camera_that_is_away() -> None:
+    proxy = Proxy("ip1", StreamSettings(), Newest(Upright()), lambda: False, lambda: False)
+    status, _, body = Studio(proxy.newest, proxy, threading.Event()).get("/camera/ip1/snapshot.jpg")
+    assert (status, b"no picture" in body) == (504, True)
+    proxy.close()
+
+
+def test_strangers_keep_nobody_out() -> None:
+    class Elsewhere(Proxy):
+        friends = 0
+
+        def may_look(self, address: str) -> bool:
+            return super().may_look("127.0.0.1" if self.friends else "192.0.2.7")
+
+    proxy = Elsewhere("ip1", StreamSettings(viewers=1), Newest(Upright()), lambda: True, lambda: False)
+    silent = [socket.create_connection(("127.0.0.1", proxy.server_port)) for _ in range(30)]
+    wait_until(lambda: proxy.porch._value == 0, "the porch to be full")
+    proxy.friends = 1
+    assert Studio(proxy.newest, proxy, threading.Event()).get("/")[0] == 404
+    proxy.friends = 0
+    for one in silent:
+        one.close()
+    proxy.close()
 
 
 def test_broken_pictures_are_counted_and_the_next_good_one_is_sent(studio: Studio) -> None:
@@ -290,7 +323,7 @@ def test_a_viewer_that_leaves_while_no_picture_comes_is_noticed(studio: Studio) 
 
 def test_the_end_of_the_service_ends_viewers_that_take_nothing() -> None:
     newest, before = Newest(Upright()), threading.active_count()
-    proxy = Proxy("ip1", StreamSettings(), newest, lambda: True, lambda: None)
+    proxy = Proxy("ip1", StreamSettings(), newest, lambda: True, lambda: False)
     stuck = socket.create_connection(("127.0.0.1", proxy.server_port))
     stuck.sendall(b"GET /camera/ip1/stream.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n")
     silent = socket.create_connection(("127.0.0.1", proxy.server_port))

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from services.camera.video import pictures
-from services.peers import free_port
+from services.peers import free_port, wait_until
 from services.simulators import camera as simulated
 from tests.camera.bench import PASSWORD, Bench, bench, simulator
 from tests.camera.video.parts import RtspCamera, rtsp_camera, time_in
@@ -37,13 +37,11 @@ def rtsp() -> Iterator[RtspCamera]:
 
 @pytest.fixture
 def here(tmp_path: Path, camera: simulated.Simulated, rtsp: RtspCamera) -> Iterator[Bench]:
-    before = threading.active_count()
     with bench(tmp_path, camera, rtsp_port=rtsp.port) as running:
         yield running
-    end = time.monotonic() + 10
-    while threading.active_count() > before:
-        assert time.monotonic() < end, threading.enumerate()
-        threading.Event().wait(0.05)
+    wait_until(
+        lambda: not {one.name for one in threading.enumerate()} & {"camera video", "camera proxy"}, "the end", 10
+    )
 
 
 def stream(here: Bench) -> dict[str, Any]:
@@ -162,6 +160,18 @@ def test_without_rtsp_snapshots_are_handed_on(tmp_path: Path, camera: simulated.
         here.until(lambda: diagnostic(here)["values"]["stream"] == "snapshots", 5)
         assert diagnostic(here)["level"] == 1
         assert "stream broke off" in diagnostic(here)["message"]
+
+
+def test_without_rtsp_the_cameras_mjpeg_is_handed_on_where_that_is_allowed(
+    tmp_path: Path, camera: simulated.Simulated
+) -> None:
+    with bench(tmp_path, camera, rtsp_port=free_port(), stream={"camera_mjpeg": True}) as here:
+        here.order("RTSP", "ON", "1")
+        assert here.end_of("1", 30)["state"] == "done"
+        here.until(lambda: diagnostic(here)["values"]["stream"] == "mjpeg", 20)
+        url = stream(here)["url"]
+        here.until(lambda: turning(here, lambda: first_picture(url)).shape == (396, 704, 3), 20)
+        here.until(lambda: diagnostic(here)["message"] == "online", 5)
 
 
 def test_a_stream_that_gives_no_picture_fails_the_order_and_stays_off(
