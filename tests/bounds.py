@@ -7,4 +7,4 @@ OFF_DEG = 0.5  # the truth, when `done` is said
 MEDIAN_START_STOP = 2.0  # time over the least time of the motors, where the camera takes only start and stop
 MEDIAN_POSITIONS = 1.3  # where it honours an absolute position
 COMMANDS = 12  # for a goal, answers to login challenges not counted
-LEARNING = 5  # goals until the motors are known; before that a goal may take more commands
+WITHIN_COMMANDS = 0.9  # of the goals at least; a first goal, or one with a late answer or two, takes more

@@ -36,7 +36,8 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     channel = Channel(config.name, config.stream, address, config.kind, post, gate)
     listener = _listener(config, address, gate, post)
     try:
-        service = CameraService(config, sender, lambda: Pool(post, config.workers), view, channel)
+        hears = listener is not None
+        service = CameraService(config, sender, lambda: Pool(post, config.workers), view, channel, hears=hears)
         try:
             yield service
         finally:

@@ -43,7 +43,10 @@ STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked 
 
 
 class CameraService:
-    """A Service (`runner.py`). `analyst` makes the one that looks at frames, a new one for each scan."""
+    """A Service (`runner.py`). `analyst` makes the one that looks at frames, a new one for each scan.
+
+    `hears`: somebody listens to the camera's alarms and posts them.
+    """
 
     def __init__(
         self,
@@ -52,6 +55,8 @@ class CameraService:
         analyst: Callable[[], Analyst],
         eye: Eye,
         channel: Channel | None = None,
+        *,
+        hears: bool = False,
     ) -> None:
         self.config = config
         self.subscribes = tuple(
@@ -84,7 +89,7 @@ class CameraService:
         self.feed = Feed(config, self.health, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
         self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes)
-        self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=config.alarm)
+        self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=hears)
         self.upkeep = Upkeep(config.name, config.clock, self.bulletin.facts, self._has_time)
         self.abilities = Abilities(config.state and config.state / f"{config.name}-can.json", self._has_time)
         self._polling = False

@@ -9,7 +9,9 @@ import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +36,8 @@ from tests.camera.bench import PASSWORD, SHIPPED, simulator
 LATENCY_S = 0.03
 AT_ONCE = 4
 UNSEEN = {  # switches that cannot be seen from outside, or only by doing harm
-    "boot_s", "drowsy_s", "latency_spread_s", "latency_tail", "lockout_failures", "lockout_of", "lockout_s",
+    "boot_s", "drowsy_s", "event_listeners", "latency_spread_s", "latency_tail",
+    "lockout_failures", "lockout_of", "lockout_s",
     "max_connections", "over_limit", "pan_acceleration", "pan_speeds", "snapshot_drop", "spurious_401", "status_lag_s",
     "stream_slowdown_s", "tilt_acceleration", "zoom_acceleration", "zoom_speed",
 }  # fmt: skip
@@ -53,7 +56,8 @@ class Quiet:
             threading.Timer(1.0, self.move).start()
 
     def move(self) -> None:
-        httpx.post(f"{self.camera.side_door_url}/event", json={"code": "VideoMotion", "action": "Start"})
+        for action in ("Start", "Stop"):
+            httpx.post(f"{self.camera.side_door_url}/event", json={"code": "VideoMotion", "action": action})
 
     def detail(self, text: str) -> None:
         pass
@@ -181,6 +185,65 @@ def test_nobody_there_is_told_at_once() -> None:
     wire.close()
 
 
+@contextmanager
+def without_cgi(camera: simulated.Simulated) -> Iterator[str]:
+    """The same camera without its own API, as some newer models are: ONVIF and its picture are all there is."""
+
+    class Visit(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+            if "/onvif/" not in self.path and "snapshot" not in self.path:
+                return self.answer(httpx.Response(404))
+            kept = {
+                key: value for key, value in self.headers.items() if key.lower() in ("authorization", "content-type")
+            }
+            there = camera.url + self.path
+            return self.answer(httpx.request(self.command, there, content=body, headers=kept, timeout=30.0))
+
+        do_POST = do_GET  # noqa: N815 (the base class looks for these names)
+
+        def answer(self, answer: httpx.Response) -> None:
+            self.send_response(answer.status_code)
+            for key in ("www-authenticate", "content-type"):
+                for value in answer.headers.get_list(key):
+                    self.send_header(key, value)
+            self.send_header("Content-Length", str(len(answer.content)))
+            self.end_headers()
+            self.wfile.write(answer.content)
+
+        def log_message(self, format: str, *args: Any) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Visit) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.05,))
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_address[1]}"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def test_a_camera_without_dahuas_api_is_met_over_onvif(tmp_path: Path) -> None:
+    with simulator(latency_s=0) as camera, without_cgi(camera) as url:
+        done = command(tmp_path, "ip9", "--url", url, "--user", "ros", "--yes-move", CAMERA_IP9_PASSWORD=PASSWORD)
+        assert done.returncode == 0, done.stderr
+        assert not [entry for entry in camera.server.log if "action=start" in entry["target"]]
+    assert "IP3M-941W" in done.stdout
+    section = yaml.safe_load((tmp_path / "probe-ip9" / "ip9.yaml").read_text())["cameras"]["ip9"]
+    assert (section["brand"], section["url"]) == ("onvif", url)
+
+
+def test_a_wrong_password_is_tried_once_over_onvif_too() -> None:
+    with simulator(latency_s=0) as camera, without_cgi(camera) as url:
+        wire = Wire(url, "ros", SecretStr("wrong-horse"))
+        with pytest.raises(BadLogin, match="no more will be"):
+            contact(wire, Quiet(camera), lambda found: True)
+        wire.close()
+        tried = [entry for entry in camera.server.log if entry["target"] == "/onvif/device_service"]
+        assert len(tried) == 4  # is there ONVIF, the time, the login, the time again
+
+
 class Interrupted(BaseException):
     """Ctrl-C, as far as the probe can tell."""
 
@@ -228,6 +291,15 @@ def test_its_profile_makes_a_simulated_camera_of_the_same_ways(meetings: dict[st
         assert {key: getattr(again, key) for key in same} == {key: getattr(true, key) for key in same}
 
 
+@pytest.mark.parametrize(("tail", "blank"), [(b"", 0), (b"\r\n", 1), (b"\r\n\r\n", 2)], ids=["none", "one", "two"])
+@pytest.mark.parametrize("part", [b"Heartbeat", b"Code=VideoMotion;action=Start;index=0;data={\n}\n"])
+def test_blank_lines_between_parts_are_counted(part: bytes, tail: bytes, blank: int) -> None:
+    whole = b"--myboundary\r\nContent-Length:9\r\n\r\n" + part + b"\r\n\r\n" + tail
+    header = b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=myboundary\r\n\r\n"
+    assert read_events(whole + whole)["event_blank_lines"] == blank
+    assert read_events(header + whole + whole)["event_blank_lines"] == blank
+
+
 def test_names_and_addresses_are_taken_out() -> None:
     clean = anonymous.cleaner("AMC018NP69LM4VM2VY", "Bedroom", "grandma")
     text = (
@@ -270,6 +342,41 @@ def test_the_command_tells_each_step_and_leaves_its_papers(tmp_path: Path) -> No
     assert {"ip9.yaml", "profile.yaml", "report.json"} <= {file.name for file in files}
     assert [file for file in files if PASSWORD in file.read_text()] == []
     assert PASSWORD not in done.stdout + done.stderr
+
+
+def test_on_a_terminal_it_asks_before_anything_moves(tmp_path: Path) -> None:
+    with simulator(latency_s=0.01) as camera:
+        words = [sys.executable, "-m", "services", "probe", "ip9", "--url", camera.url, "--user", "ros"]
+        environment = {
+            **os.environ,
+            "PYTHONPATH": str(SHIPPED.parent),
+            "CAMERA_IP9_PASSWORD": PASSWORD,
+            "TERM": "xterm",
+        }
+        ours, theirs = os.openpty()
+        with subprocess.Popen(
+            words, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs, env=environment
+        ) as process:
+            os.close(theirs)
+            shown = ""
+            while "May it move now?" not in shown:
+                shown += os.read(ours, 65536).decode()
+            os.write(ours, b"n\n")
+            while process.poll() is None:
+                shown += read_all(ours)
+        os.close(ours)
+        assert process.returncode == 0, shown
+        assert not [entry for entry in camera.server.log if "action=start" in entry["target"]]
+    assert "only a moving camera shows it" in shown
+    assert PASSWORD not in shown
+
+
+def read_all(terminal: int) -> str:
+    """What there is to read of a terminal; nothing when its other side is closed."""
+    try:
+        return os.read(terminal, 65536).decode(errors="replace")
+    except OSError:
+        return ""
 
 
 def test_the_command_gives_data_and_takes_a_configured_camera(tmp_path: Path) -> None:

@@ -3,5 +3,5 @@
 From outside in: `command` (what a user starts), `contact` (the order of things), `login`, `firmware`, `stream` and
 `turning` (each asks some questions; `turner` runs the motors), `wire` (sends and remembers). What was found is a
 `findings.Findings`; `paper` and `anonymous` make files of it, `show` the text on a terminal. It is made for cameras
-with Dahua's HTTP API.
+with Dahua's HTTP API; of others that speak ONVIF it tells less (`onvif`).
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from services.camera.probe import firmware, login, stream, turning
+from services.camera.probe import firmware, login, onvif, stream, turning
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
 
@@ -22,7 +22,7 @@ READS: tuple[tuple[str, Ask], ...] = (
     ("Its clock", firmware.clock),
     ("Snapshots", firmware.pictures),
     ("Events", stream.events),
-    ("ONVIF", firmware.onvif),
+    (onvif.STEP, firmware.onvif),
 )
 MOVING = "Speeds, delays and directions"
 MOVES = (
@@ -51,7 +51,15 @@ def contact(wire: Wire, teller: Teller, may_move: Callable[[Findings], bool]) ->
     """Everything that can be found out. DeviceError when the camera takes no login or cannot be asked at all."""
     found = Findings(wire.url)
     wire.tell = teller.detail
-    for step, ask in READS:
+    try:
+        _take(*READS[0], wire, found, teller)
+    except login.Foreign:
+        firmware.onvif(wire, found)
+        if not found.switches["onvif"]:
+            raise
+        _take(onvif.STEP, onvif.meet, wire, found, teller)
+        return found
+    for step, ask in READS[1:]:
         _take(step, ask, wire, found, teller)
     if may_move(found):
         _take(MOVING, turning.turn, wire, found, teller)

@@ -29,6 +29,8 @@ def identity(wire: Wire, found: Findings) -> None:
     found.vendor, found.name = table.get("vendor", ""), table.get("name", "")
     version = wire.ask(system.magic("getSoftwareVersion"), "getSoftwareVersion").text
     found.firmware, _, found.built = system.read_version(version).partition(" ")
+    kind = wire.ask(system.magic("getDeviceClass"), "getDeviceClass")
+    found.switches["device_class"] = kind.good and "lass=" in kind.text
     found.brand = "amcrest"
     found.switches |= {"version_form": "one line" if "build:" in version else "two lines"}
 
@@ -66,7 +68,7 @@ def _daynight(wire: Wire, found: Findings, options: Exchange) -> None:
     elif "DayNightColor" in options.text:
         found.switches["daynight"] = "VideoInOptions"
     mask = wire.ask(f"{CONFIG}LeLensMask", "LeLensMask")
-    found.capabilities["privacy"] = "LeLensMask" in mask.text if mask.status in (200, 400, 501) else None
+    found.switches["lens_mask"] = found.capabilities["privacy"] = "LeLensMask" in mask.text
 
 
 def channels(wire: Wire, found: Findings) -> None:
@@ -98,9 +100,14 @@ def latency(wire: Wire, found: Findings) -> None:
         readings.add((reading.pan, reading.tilt))
     found.switches["status_dither"] = len(readings) > 1
     took = [one.seconds for one in wire.exchanges if one.status == 200 and "ptz.cgi" in one.target]
-    found.latency_ms = {"median": _ms(share(took, 0.5)), "p95": _ms(share(took, 0.95)), "worst": _ms(max(took))}
+    found.latency_ms = times(took)
     if words <= {"Moving"}:
         found.switches["move_status"] = "stuck"
+
+
+def times(took: list[float]) -> dict[str, float]:
+    """Seconds as the milliseconds that are shown. Pure."""
+    return {"median": _ms(share(took, 0.5)), "p95": _ms(share(took, 0.95)), "worst": _ms(max(took))}
 
 
 def _ms(seconds: float) -> float:

@@ -7,7 +7,7 @@ from typing import Any
 
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import ODD_S, Exchange, Wire
-from services.camera.requests import BadLogin
+from services.camera.requests import Refused
 from services.camera.web.digest import Challenge, read_challenge
 
 TARGET = "/cgi-bin/magicBox.cgi?action=getDeviceType"
@@ -18,11 +18,15 @@ PAIR = re.compile(r'(\w+)\s*=\s*(?:"([^"]*)"|([^,\s]+))')
 STANDARD = ("www-authenticate", "connection", "content-length", "content-type", "date", "server")
 
 
+class Foreign(Refused):
+    """The camera does not speak Dahua's HTTP API."""
+
+
 def first(wire: Wire, found: Findings) -> None:
     """The challenge as it comes, then the one login that decides whether the password is right."""
     challenge = wire.bare(TARGET, "challenge")
     if challenge.status == 404:
-        raise BadLogin("this camera has no Dahua or Amcrest HTTP API (/cgi-bin is not there)")
+        raise Foreign("this camera has no Dahua or Amcrest HTTP API (/cgi-bin is not there)")
     found.switches |= read_challenge_form(challenge)
     wire.ask(TARGET, "device type")
 

@@ -12,13 +12,13 @@ from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
 
 MEASURED = ("latency_s", "snapshot_s", "tilt_share")
-NOT_SWITCHES = ("event_form", "event_header_twice", "event_length_spaced")  # of no profile yet; they are in the report
 
 
 def section(found: Findings, name: str, user: str) -> str:
     """The camera's section, as `apartment check` takes it; what could not be found out is a comment."""
     tilt = found.capabilities.get("tilt_range") or [-10, 108]
     channels = found.switches.get("ptz_channels") or ()
+    measured = "as the camera says" if "tilt_range" in found.capabilities else "not told: measure it"
     lines = [
         f"# {' '.join(part for part in (found.vendor, found.model, found.firmware) if part)}".rstrip(),
         "cameras:",
@@ -34,7 +34,7 @@ def section(found: Findings, name: str, user: str) -> str:
         flip, mirror = (str(found.picture[key]).lower() for key in ("flip", "mirror"))
         lines.append(f"    picture: {{flip: {flip}, mirror: {mirror}}}")
     lines += [
-        f"    tilt_range: [{tilt[0]:g}, {tilt[1]:g}]                   # as the camera says",
+        f"    tilt_range: [{tilt[0]:g}, {tilt[1]:g}]                   # {measured}",
         "    pan_dead_arc: [179, 186]                # not measured: what siblings of this camera have",
         f"    places: {name}                             # a folder; it is made when the first place is saved",
         "    # mount, camera_info, markers: see config/apartment.yaml; a scan needs them",
@@ -54,7 +54,7 @@ def profile(found: Findings) -> str:
 
 def switches(found: Findings) -> dict[str, Any]:
     """What a simulator's profile takes, in its own words."""
-    known = {key: value for key, value in found.switches.items() if value is not None and key not in NOT_SWITCHES}
+    known = {key: value for key, value in found.switches.items() if value is not None}
     seen = {"model": found.model, "firmware": found.firmware, "built": found.built, **known}
     if "median" in found.latency_ms:
         seen["latency_s"] = round(found.latency_ms["median"] / 1000, 3)

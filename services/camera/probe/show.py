@@ -24,7 +24,8 @@ WORDS: dict[str, tuple[str, dict[object, str]]] = {  # switch -> what it is, and
                           "flaky": "works again at times: about one and a half requests per command"}),
     "challenge_spacing": ("Challenge", {"compact": "without spaces", "spaced": "with spaces"}),
     "digest_algorithms": ("Digest with", {}),
-    "error_style": ("It says no by", {"200-error": "200 and the word Error", "400-body": "400", "501": "501"}),
+    "error_style": ("It says no by", {"200-error": "status 200 and the word Error", "400-body": "status 400",
+                                      "501": "status 501"}),
     "brackets": ("[0] in a request", {"both": "plain or encoded", "raw": "plain only", "encoded": "encoded only"}),
     "config_narrowing": ("Parts of tables", {True: "can be asked for", False: "come empty: whole tables only"}),
     "daynight": ("Day and night in", {}),
@@ -43,6 +44,7 @@ WORDS: dict[str, tuple[str, dict[object, str]]] = {  # switch -> what it is, and
     "continuously": ("Timed moves", {True: "are taken", False: "are refused"}),
     "heartbeat": ("Event stream", {True: "has a heartbeat", False: "is silent when nothing happens"}),
     "event_form": ("Events", {"A": "form A, with data", "B": "form B, without data"}),
+    "event_header_twice": ("Its first answer has", {True: "a second header in its body", False: "one header"}),
     "onvif": ("ONVIF", {True: "yes", False: "no, or switched off"}),
 }  # fmt: skip
 STEPS = len(READS) + 1
@@ -140,12 +142,17 @@ def report(console: Console, found: Findings) -> None:
     console.print()
     console.print(Panel(_head(found), title="[bold]" + (found.model or "camera") + "[/]", expand=False))
     table = Table("", "how this firmware behaves", box=box.SIMPLE, show_edge=False, pad_edge=False)
-    for switch, (name, _) in WORDS.items():
+    for switch, (name, _) in WORDS.items() if found.brand == "amcrest" else ():
         unsure = switch in found.unknown
         text = f"not found out: {found.unknown[switch]}" if unsure else meaning(switch, found.switches)
+        if switch == "position_abs" and (beside := found.switches.get("position_abs_tilt_off")):
+            text += f", but tilt ends {beside:+.1f}° beside"
         table.add_row(name, Text(text, "dim" if unsure or text == "not found out" else ""))
-    console.print(table)
+    if table.rows:
+        console.print()
+        console.print(table)
     if found.speeds:
+        console.print()
         console.print(_speeds(found))
     for note in found.notes:
         console.print(f"Note: {note}.", markup=False)
@@ -165,7 +172,12 @@ def _head(found: Findings) -> Table:
         ("Sound", f"{can.get('audio_in', 0)} microphone(s), {can.get('audio_out', 0)} loudspeaker(s)"),
         ("Privacy mask", "yes" if can.get("privacy") else "no"),
         ("Answers", _times(found.latency_ms)),
-        ("Clock", "not told" if found.clock_off_s is None else f"{found.clock_off_s:+.0f} s against this computer"),
+        ("Snapshots", _channels(can.get("snapshot_channels"))),
+        ("Motors", _delays(found.delays_s)),
+        (
+            "Clock",
+            "not told" if found.clock_off_s is None else f"{found.clock_off_s + 0.0:+.1f} s against this computer",
+        ),
     )
     for name, text in rows:
         table.add_row(Text(name, "dim"), Text(text))
@@ -179,6 +191,20 @@ def _words(size: tuple[int, int] | None, picture: Mapping[str, Any]) -> list[str
 
 def _times(latency_ms: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {value:.0f} ms" for name, value in latency_ms.items())
+
+
+def _channels(good: list[int | None] | None) -> str:
+    """With which channels a snapshot was given."""
+    words = ["without a channel" if one is None else f"with channel {one}" for one in good or ()]
+    return ", ".join(words) or "none was given"
+
+
+def _delays(delays_s: Mapping[str, float]) -> str:
+    """As the reading tells it, so with the time that an answer takes."""
+    both = [axis for axis in ("pan", "tilt") if {f"{axis}_start", f"{axis}_stop"} <= set(delays_s)]
+    words = "{} moves {:.2f} s after the order, stands {:.2f} s after the stop"
+    told = [words.format(axis, delays_s[f"{axis}_start"], delays_s[f"{axis}_stop"]) for axis in both]
+    return "\n".join(told) or "not tried"
 
 
 def _speeds(found: Findings) -> Table:

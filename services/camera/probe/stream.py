@@ -58,5 +58,9 @@ def read_events(body: bytes) -> dict[str, Any]:
         form["event_form"] = "A" if event[1] else "B"
     length = re.search(rb"Content-Length:( ?)(\d+)", body, re.IGNORECASE)
     if length:
-        form["event_length_spaced"] = bool(length[1])
+        form["event_length_space"] = bool(length[1])
+        parts = body[length.end() :]  # a second header block ends in an empty line too
+        between = re.search(rb"(?:[^\r\n]\n?)\r\n\r\n((?:\r\n)*)--\w", parts)
+        if between:
+            form["event_blank_lines"] = len(between[1]) // 2
     return form

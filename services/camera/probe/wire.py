@@ -106,11 +106,16 @@ class Wire:
     @contextmanager
     def stream(self, target: str, silence_s: float) -> Iterator[httpx.Response]:
         """An endless answer, with a login; httpx.ReadTimeout when nothing comes for so long."""
-        challenge = self._read(self.bare(target))
-        headers = {"Authorization": self._authorization("GET", target, challenge)}
         try:
-            with self.http.stream("GET", target, headers=headers, timeout=httpx.Timeout(silence_s)) as response:
-                yield response
+            for left in reversed(range(ODD_TRIES)):
+                challenge = self._read(self.bare(target))
+                headers = {"Authorization": self._authorization("GET", target, challenge)}
+                with self.http.stream("GET", target, headers=headers, timeout=httpx.Timeout(silence_s)) as response:
+                    if response.status_code != 401 or not left:
+                        yield response
+                        return
+                self.odd += 1
+                self.pause(ODD_S)
         except httpx.HTTPError as error:
             raise Away(f"the stream broke off: {type(error).__name__}") from error
 

@@ -18,13 +18,14 @@ NEAR_DEG = 0.35  # a reading as near as that has arrived: 0.5 degree promised, i
 GOOD_DEG = 0.3  # 0.5 degree promised; the reading has its own 0.1 and dithers
 NOISE_DEG = 0.1
 COMMAND_S = 0.2  # what a command is worth beside the time it takes: there is a limit to them
-CORRECTION_S = 3.4  # a correction takes at least so many answers
+CORRECTION_S = 2.0  # a correction takes about so many answers, since it often begins without a reading
 PER_ROOT_DEG_S = 0.35  # and so much for the slow part of the way
 SLOW_DEG = 16.0
 FAR_S = 1.5
 ALIKE = 0.3  # axes whose times differ by this part of the longer one, or less, may have one end
 LONG = 4.0  # answers: a leg as long as that is read in, which leaves part of the rate in doubt
 READ_ON_THE_WAY = 0.1
+DANGER = 1000.0  # the cost of what should not be done
 CRAWL_DEG = 0.2  # so much of a goal may be given up for the fear of a late stop
 
 
@@ -133,8 +134,9 @@ def _judged(leg: Leg, ways: dict[int, Way], skill: Skill, hurry: float) -> Leg:
     for axis, part in leg.parts.items():
         way = ways[axis]
         spread = way.pace.rate(part.speed) * skill.timing.spread + _doubt(way.pace, part.speed, part.held, skill)
-        if part.off + way.pace.rate(part.speed) * skill.timing.tail > way.room + CRAWL_DEG and part.off > -CRAWL_DEG:
-            return replace(leg, cost=1000.0 + part.speed + part.off)  # this may push against a stop
+        beyond = part.off + way.pace.rate(part.speed) * skill.timing.tail - way.room
+        if beyond > CRAWL_DEG:
+            return replace(leg, cost=DANGER + beyond)  # a late end may push against a stop
         chances.append(_chance(part.off, spread + NOISE_DEG))
         misses.append(_way_s(abs(part.off) + spread / 2, way.pace))
     left = [_way_s(abs(way.distance), way.pace) for axis, way in ways.items() if axis not in leg.parts]

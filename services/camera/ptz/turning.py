@@ -11,12 +11,12 @@ from services.camera.plan import Plan, wait
 from services.camera.ptz import drive as own
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.helm import Helm, levels_of, sign
-from services.camera.ptz.leg import GOOD_DEG, NEAR_DEG, Leg, Way, choose
+from services.camera.ptz.leg import DANGER, GOOD_DEG, NEAR_DEG, Leg, Way, choose
 from services.camera.ptz.zooming import Zooming
 from services.camera.requests import Reading, Refused, Status
 
 RUNGS = 6  # legs without a rest between them
-RECKONED_DEG = 0.3
+RECKONED_DEG = 0.4
 FEW_COMMANDS = 3  # after so many, accuracy goes before time
 DEARER = 0.7  # each command more makes a correction so much dearer
 MANY_COMMANDS = 7  # after so many, a look has to be worth more
@@ -56,6 +56,8 @@ class Turning:
         for _ in range(RUNGS):
             now = yield from self._swing(axes, now)
             leg, turning = self._choose(axes, now)
+            if leg.cost >= DANGER and any(self.helm.course.levels[:2]):
+                return (yield from self.helm.stop(now))  # from rest there will be a better one
             now = (yield from self.helm.start(levels_of(turning))).received
             now = yield from self._see_through(leg, turning, now)
             others = [axis for axis in axes if axis not in leg.parts]

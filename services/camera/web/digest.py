@@ -17,7 +17,7 @@ from typing import Literal
 import httpx
 from pydantic import SecretStr
 
-from services.camera.web.gate import ODD_S, Gate
+from services.camera.web.gate import Gate
 from services.errors import DeviceError
 
 _FIELD = re.compile(r'(\w+)\s*=\s*(?:"([^"]*)"|([^\s,]+))')
@@ -161,8 +161,7 @@ class Login(httpx.Auth):
                     return
                 continue
             if refusals:
-                self.gate.check()
-                self.gate.pause(ODD_S)
+                self.gate.rest()
             old = self.challenge.count > 0
             with self.gate.login(urgent=self.urgent) as login:
                 if old and login.doubted:

@@ -21,6 +21,7 @@ from services.errors import DeviceError
 
 MOST_FAILURES = 3
 MOST_ODD, ODD_WINDOW_S = 7, 10.0
+PATIENT_S = 2.0  # so long a request waits for a camera that refuses at random, before it gives up
 RETRY_S, LONGEST_RETRY_S = 120.0, 1800.0  # a lock lasts about 30 minutes
 ODD_S = 0.5  # an odd refusal of a valid login is over after so long
 WAY_S = 5.0  # who waits longer for a stop that goes first gives up
@@ -158,6 +159,17 @@ class Gate:
         with self.changed:
             if (why := self.book.closed(self.clock())) is not None:
                 raise why
+
+    def rest(self) -> None:
+        """Between a refusal and the next try: waits out an odd one, or raises what closed the gate."""
+        with self.changed:
+            book, now = self.book, self.clock()
+            shut_s = (book.opens_at or now) - now
+            if book.closed(now) is None or book.why != "odd" or shut_s > PATIENT_S:
+                shut_s = 0.0
+        if not shut_s:
+            self.check()
+        self.pause(max(ODD_S, shut_s))
 
     def locked(self) -> Locked:
         """The camera said that the account is locked; the error to raise."""

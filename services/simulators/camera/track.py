@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from math import copysign, inf, sqrt
 from typing import NamedTuple
 
+ROUNDING_S = 1e-6  # who comes to rest exactly at an end stop may be pushing for a billionth of a second by the numbers
+
 
 @dataclass(frozen=True)
 class Rail:
@@ -83,7 +85,7 @@ class Track:
 
     def pushed(self, now: float) -> float:
         """Seconds by then in which it pushed against an end stop."""
-        return sum(seconds for piece, seconds in self._until(now) if piece.pushes)
+        return sum(seconds for piece, seconds in self._until(now) if piece.pushes and piece.seconds > ROUNDING_S)
 
     def _until(self, now: float) -> Iterator[tuple[Piece, float]]:
         left = now - self.began

@@ -37,4 +37,4 @@ def test_a_goal_takes_few_commands(moved: tuple[str, list[Outcome]]) -> None:
     _, found = moved
     assert median(one.commands for one in found) <= bounds.COMMANDS - 2
     few = [one.commands <= bounds.COMMANDS for one in found]
-    assert sum(few) >= 0.9 * len(few)
+    assert sum(few) >= bounds.WITHIN_COMMANDS * len(few)
