@@ -397,8 +397,21 @@ def test_an_order_does_what_it_says_and_is_answered_step_by_step(case: Case, her
     case.after(here)
 
 
-def test_every_order_is_in_the_table() -> None:
-    assert {case.key for case in CASES} == {name for name, _ in orders.KEYS.values()} | {"Position"}
+def test_calibrating_turns_the_camera_and_a_stop_ends_it(here: Here) -> None:
+    """The whole of it takes most of a minute; it is tried in virtual time."""
+    stands_at(60.0, 20.0)(here)
+    here.give("CalibratePtz", "True")
+    here.until(lambda: here.door.moving, "the camera to turn")
+    here.give("Move", "Stop")
+    here.bus.payload("camera/ip1/order_result", lambda result: (result.key, result.state) == ("Move", "done"), 20.0)
+    said = [OrderResult.model_validate_json(one.payload) for one in here.bus.seen if one.topic.endswith("order_result")]
+    assert [one.state for one in said if one.key == "CalibratePtz"] == ["accepted", "running", "cancelled"]
+    assert not here.door.moving
+
+
+def test_every_order_is_tried() -> None:
+    tried = {case.key for case in CASES} | {"CalibratePtz"}
+    assert tried == {name for name, _ in orders.KEYS.values()} | {"Position"}
 
 
 @pytest.fixture
