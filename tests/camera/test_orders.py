@@ -394,4 +394,5 @@ def test_an_order_does_what_it_says_and_is_answered_step_by_step(case: Case, her
 
 
 def test_every_order_is_in_the_table() -> None:
-    assert {case.key for case in CASES} == {name for name, _ in orders.KEYS.values()} | {"Position"}
+    elsewhere = {"CalibratePtz"}  # takes minutes: `tests/camera/ptz/test_calibrate.py`, in virtual time
+    assert {case.key for case in CASES} == {name for name, _ in orders.KEYS.values()} - elsewhere | {"Position"}
