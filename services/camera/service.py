@@ -24,8 +24,8 @@ from services.camera.health import IDLE_S, Health
 from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
-from services.camera.ptz.errands import Errands
 from services.camera.ptz.motors import Motors
+from services.camera.ptz.trips import Trips
 from services.camera.requests import GetPicture, Identify, Identity, Picture, Rank, Reading, Refused, Reply, Status
 from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
@@ -82,9 +82,9 @@ class CameraService:
         self.answers = Answers(config.name, publish, self.bulletin.position)
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
-        self.errands = Errands(config, self.bulletin, self.places)
-        self.motors.skill = self.errands.skill
-        self.scanner = Scanner(config, self.errands.skill, eye, analyst, self.bulletin, self.places)
+        self.trips = Trips(config, self.bulletin, self.places)
+        self.motors.skill = self.trips.skill
+        self.scanner = Scanner(config, self.trips.skill, eye, analyst, self.bulletin, self.places)
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
@@ -184,14 +184,14 @@ class CameraService:
             self._take_picture(reply.result)
         elif isinstance(reply.result, Identity):
             self.bulletin.identity = reply.result
-            self.errands.meet(reply.result)
+            self.trips.meet(reply.result)
         self.stage.reply(reply, now)
 
     def _take_picture(self, picture: Picture) -> None:
         """The motors and the streams follow the picture."""
         old, self.scanner.picture = self.scanner.picture, picture
         self.feed.turned(picture)
-        self.errands.see(picture, old)
+        self.trips.see(picture, old)
 
     def _poll(self, now: float) -> Plan[None]:
         """Asks where the camera looks while nobody else does, and who it is after it was away."""
@@ -264,7 +264,7 @@ class CameraService:
         if not free and not self.health.online:
             raise Refused(f"the camera is {self.health.state}: {self.health.reason}")
         if isinstance(command, GotoPlace | LookAt):
-            self.errands.goal(command)
+            self.trips.goal(command)
         elif isinstance(command, orders.RemovePlace):
             self.places.get(command.place)
         elif isinstance(command, orders.Broadcast):
@@ -276,9 +276,9 @@ class CameraService:
         if isinstance(command, ScanFor):
             return self.scanner.plan(command, now)
         if isinstance(command, orders.Calibrate):
-            return self.errands.calibrate()
+            return self.trips.calibrate()
         assert isinstance(command, GotoPlace | LookAt)
-        return self.errands.plan(command, now)
+        return self.trips.plan(command, now)
 
     def _motor_ended(self, job: Job, state: OrderState, error: str | None, now: float) -> None:
         if isinstance(job.command, ScanFor):

@@ -88,10 +88,13 @@ class Helm:
         reading = cast(Reading, reply.result)
         self._weigh(reading)
         self.course.read(reply, reading)
-        while self.zoom_ends is None and (pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading)):
+        while self.zoom_ends is None and (
+            pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading) or self._moves(reading)
+        ):
             again = yield from self.send(Status())
             before, reading, reply = reading, cast(Reading, again.result), again
             if same(before, reading):
+                self.skill.always_moving = reading.moving is True
                 break
         if self.zoom_ends is not None:
             self.time_zoom(reply.received)
@@ -123,6 +126,10 @@ class Helm:
             for axis in (PAN, TILT)
             if self.course.told[axis]
         )
+
+    def _moves(self, reading: Reading) -> bool:
+        """Whether the camera says that it moves; some firmware says so for ever."""
+        return reading.moving is True and not self.skill.always_moving
 
     def _settled(self) -> float:
         """When a reading has to be asked for that shows everything at rest."""

@@ -16,8 +16,7 @@ Honours = Literal["unknown", "no", "pan", "yes"]  # of a way to let the firmware
 DRIVES = (45.0, 27.0, 4.0)  # degrees/s, levels/s: the firmware's own moves, a guess to begin with
 KEEP = 120  # answers, for how long they take
 LATENCY_S, SPREAD_S = 0.3, 0.1  # of an answer, before any was measured
-TAIL_S = 1.0  # an answer may come so much later than usual, until experience says otherwise
-EXPERIENCE = 150  # answers without a late one that make a tail half as likely
+TAIL_S = 1.0  # an answer may always come so much later than usual: busy Wi-Fi does that to two in a hundred
 FORGETS, WORSE = 0.998, 1.2  # of the latest answer: kept with each one more; and it may be later the next time
 SOONER_S, LATER_S, MOST_LATE_S = 0.008, 0.04, 0.5
 GRIDS = (2.0, 1.0)  # some firmware tells zoom in coarse steps
@@ -55,8 +54,8 @@ class Timing:
 
     @property
     def tail(self) -> float:
-        """How much later than usual an answer may come: what happened, and some doubt while little has."""
-        return max(TAIL_S / (1 + self.count / EXPERIENCE), WORSE * self.worst, self.spread)
+        """How much later than usual an answer may come: what happened, or more."""
+        return max(TAIL_S, WORSE * self.worst, self.spread)
 
 
 @dataclass
@@ -71,6 +70,7 @@ class Skill:
     picture: tuple[bool, bool] = (False, False)  # flip and mirror, with which the senses were seen
     surprise: float = 0.1  # s: how far off a place of rest is reckoned, over the speed before it
     diagonals: bool = True
+    always_moving: bool = False  # it says that it moves while it rests
     zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
     drives: tuple[Pace, Pace, Pace] = field(default_factory=lambda: tuple(Pace((top,)) for top in DRIVES))  # type: ignore[assignment]

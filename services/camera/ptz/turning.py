@@ -15,12 +15,12 @@ from services.camera.ptz.leg import DANGER, GOOD_DEG, NEAR_DEG, Leg, Way, choose
 from services.camera.ptz.zooming import Zooming
 from services.camera.requests import Reading, Refused, Status
 
-RUNGS = 6  # legs without a rest between them
+RUNGS = 3  # legs without a rest between them
 RECKONED_DEG = 0.4
 FEW_COMMANDS = 3  # after so many, accuracy goes before time
 DEARER = 0.7  # each command more makes a correction so much dearer
 MANY_COMMANDS = 7  # after so many, a look has to be worth more
-ENOUGH_DEG = 0.2  # doubt about the place of an end that needs no look
+ENOUGH_DEG = 0.4  # doubt about the place of an end that needs no look
 PROBE_DEG_S = 9.0
 PROBE_S = 0.35  # seen in the readings, and harmless the wrong way
 MOVED_DEG = 0.3
@@ -138,6 +138,13 @@ class Turning:
         goal = self.helm.aim[axis] + leg.parts[axis].off * sign(self.helm.course.levels[axis])
         return self.helm.course.end_for(axis, goal, now)
 
+    def _safe(self, axis: int, rate: float, now: float) -> float:
+        """Until when an axis may wait for the other's end: later, a late answer lets it push against its stop."""
+        low, high = self.helm.limits.ranges[axis]
+        before = rate * self.helm.skill.timing.tail
+        stop = high - before if self.helm.course.levels[axis] > 0 else low + before
+        return self.helm.course.end_for(axis, stop, now)
+
     def _watch(self, leg: Leg, left: dict[int, int], now: float) -> Plan[float]:
         """Waits until the next end has to be sent; reads on the way where that makes the end more certain."""
         usual, spread = self.helm.skill.timing.usual, self.helm.skill.timing.spread
@@ -146,7 +153,7 @@ class Turning:
             rates = {axis: self.helm.skill.paces[axis].rate(leg.parts[axis].speed) for axis in left}
             if leg.joint:
                 together = sum(ends[axis] * rates[axis] for axis in left) / sum(rates.values())
-                send = min([together, *(ends[axis] for axis in left if leg.parts[axis].feared)]) - usual
+                send = min([together, *(max(ends[axis], self._safe(axis, rates[axis], now)) for axis in left)]) - usual
             else:
                 send = min(ends.values()) - usual
             if look == LOOKS or send - now < usual + spread:
@@ -168,8 +175,8 @@ class Turning:
         for axis in axes if self.helm.skill.diagonals else axes[:1]:
             here = self.helm.course.origin[axis]
             low, high = self.helm.limits.ranges[axis]
-            most = min(PROBE_DEG_S, min(high - here, here - low))
-            pace = self.helm.skill.paces[axis]
+            timing, pace = self.helm.skill.timing, self.helm.skill.paces[axis]
+            most = min(PROBE_DEG_S, min(high - here, here - low) / (PROBE_S + 2 * timing.usual + timing.tail))
             speed = max((speed for speed in pace.speeds if pace.guess[speed - 1] <= most), default=1)
             levels[axis] = speed * (1 if self.helm.aim[axis] > here else -1)
         now = (yield from self.helm.start((levels[0], levels[1], levels[2]))).received

@@ -1,4 +1,7 @@
-"""Fifty random goals on every firmware that the simulator has, in virtual time, against the bounds."""
+"""Random goals on every firmware that the simulator has, in virtual time, against the bounds.
+
+Fifty goals from a cold start, and that three times: with one seed alone a median may be a tenth off.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,13 @@ from services.simulators.camera.firmwares import PROFILES
 from tests import bounds
 from tests.camera.goals import Outcome, outcomes, positions, random_goals
 
-SEED = 4
+SEEDS = (1, 2, 3)
 
 
 @pytest.fixture(scope="module", params=sorted(PROFILES))
 def moved(request: pytest.FixtureRequest) -> tuple[str, list[Outcome]]:
-    return request.param, outcomes(PROFILES[request.param], random_goals(bounds.GOALS, SEED), SEED)
+    profile = PROFILES[request.param]
+    return request.param, [one for seed in SEEDS for one in outcomes(profile, random_goals(bounds.GOALS, seed), seed)]
 
 
 def test_every_goal_is_reached_within_half_a_degree_and_at_rest_when_done_is_said(
@@ -25,11 +29,19 @@ def test_every_goal_is_reached_within_half_a_degree_and_at_rest_when_done_is_sai
     assert [one for one in found if one.error or one.off > bounds.OFF_DEG or not one.rests] == []
 
 
-def test_the_motors_take_hardly_longer_than_they_must(moved: tuple[str, list[Outcome]]) -> None:
+def test_no_motor_is_pushed_against_the_end_of_its_way(moved: tuple[str, list[Outcome]]) -> None:
+    _, found = moved
+    assert [one for one in found if one.pushed] == []
+
+
+def test_the_motors_take_hardly_longer_than_they_must(
+    moved: tuple[str, list[Outcome]], request: pytest.FixtureRequest
+) -> None:
     name, found = moved
-    bound = bounds.MEDIAN_POSITIONS if positions(PROFILES[name]) else bounds.MEDIAN_START_STOP
     if PROFILES[name].position_abs == "pan-only":
-        pytest.skip("tilt by start and stop after pan by position, 0.45 s an answer: the bench prints how long")
+        why = "answers take longer here and tilt goes by start and stop: 2.1 to 2.4 is what it takes"
+        request.applymarker(pytest.mark.xfail(reason=why, strict=True))
+    bound = bounds.MEDIAN_POSITIONS if positions(PROFILES[name]) else bounds.MEDIAN_START_STOP
     assert median(one.ratio for one in found) <= bound
 
 

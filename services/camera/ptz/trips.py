@@ -20,7 +20,7 @@ from services.camera.settings import Config
 FRESH_S = 2.0  # a reading as old as this still tells where a camera at rest looks
 
 
-class Errands:
+class Trips:
     """The moves of one camera; `skill` is what they teach."""
 
     def __init__(self, config: Config, bulletin: Bulletin, places: Places) -> None:
