@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 
 from services import document
 from services.camera.address import Address
@@ -26,28 +26,19 @@ from services.vision.lens import Lens
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[CameraService]:
     """The service, with its threads to the camera; at the end a stop is sent and confirmed."""
-    address = config.address
-    view = eye(config)
-    watchdog = Watchdog(config.brand, address)
-    gate = Gate(config.login_retry_s)
-    device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell, owing=gate.owe)
-    made_sound = getattr(brand(config.brand), "sound", None)
-    sender = Desk(device, made_sound(address, gate) if made_sound else None, post)
-    channel = Channel(config.name, config.stream, address, config.kind, post, gate)
-    listener = _listener(config, address, gate, post)
-    try:
+    view, address, gate = eye(config), config.address, Gate(config.login_retry_s)
+    with ExitStack() as stack:  # what was opened last is closed first: nobody gives an order while the motors are ended
+        channel = stack.enter_context(closing(Channel(config.name, config.stream, address, config.kind, post, gate)))
+        watchdog = stack.enter_context(closing(Watchdog(config.brand, address)))
+        device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell, owing=gate.owe)
+        made_sound = getattr(brand(config.brand), "sound", None)
+        sender = stack.enter_context(closing(Desk(device, made_sound(address, gate) if made_sound else None, post)))
+        listener = _listener(config, address, gate, post)
+        if listener is not None:
+            stack.callback(listener.close)
         hears = listener is not None
         service = CameraService(config, sender, lambda: Pool(post, config.workers), view, channel, hears=hears)
-        try:
-            yield service
-        finally:
-            service.close()
-    finally:
-        if listener is not None:
-            listener.close()
-        sender.close()
-        watchdog.close()
-        channel.close()
+        yield stack.enter_context(closing(service))
 
 
 def _listener(config: Config, address: Address, gate: Gate, post: Post) -> Listener | None:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
-from unittest.mock import Mock
 
 from pydantic import SecretStr
 
@@ -92,7 +91,7 @@ class Rig:
         rng = random.Random(self.seed)
         self.device = Device(self.camera, self.profile, self.now, Latency(self.profile, None, rng))
         door = Door(realm(self.profile, self.camera.serial), "ros", "secret123", self.profile, rng)
-        self.wire = Counted(Inside(self.device, door, Mock()))
+        self.wire = Counted(Inside(self.device, door, cast(Any, None)))
         address = Address("http://192.0.2.9", "ros", SecretStr("secret123"))
         self.client = Amcrest(address, self.wire)
         self.skill.forget_senses(flip=True, mirror=True)
