@@ -19,7 +19,7 @@ from services.camera.video.session import Arrival, Session
 from services.camera.video.timing import Exposure, StreamClock
 from services.errors import DeviceError
 
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 10.0
 MARGIN_S = 0.5  # so that the gate is open when it is asked again
 PATIENCE = 2  # failures of the best way before another one is tried
 BETTER_S = 300.0  # so long a worse way is used before the best one is tried again
