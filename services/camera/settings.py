@@ -41,7 +41,7 @@ class MotionSettings(Section):
 
     codes: tuple[str, ...] = ("VideoMotion",)  # the camera's words; SmartMotionHuman and others where it has them
     hold_s: float = Field(default=15.0, gt=0, le=600)
-    heartbeat_s: int = Field(default=4, ge=1, le=60)  # three missed ones are noticed within 15 s
+    heartbeat_s: int = Field(default=3, ge=1, le=60)  # three missed ones are noticed in 10 s: time enough to tell it
 
 
 class ClockSettings(Section):
