@@ -38,6 +38,7 @@ from services.runner import Post
 
 REPLY = "/camera/reply"
 STILL_DEG = 0.25  # two readings nearer than this are the same: the resolution is 0.1 degree, and some dither by that
+STOP_ALONE_S = 1.0  # longer than the pause between two tries of a stop
 END_S = 3.5  # the end of the service waits so long for a camera to stand still; then its watchdog goes on
 
 DRIVE: Final = "drive"  # what turns when the firmware drives by itself
@@ -85,6 +86,7 @@ class Lane:
         self.clock = clock
         self.turning = turning
         self.started = False  # a motion may be running
+        self._others_at = 0.0  # until then only a stop is sent
         self._driven: Reading | None = None  # the last reading since the firmware began to drive
         self._drives = False
         self._waiting: list[_Waiting] = []
@@ -125,6 +127,7 @@ class Lane:
                 result = self._send(waiting.request)
             except DeviceError as error:
                 if isinstance(error, Away) and self.started:
+                    self._others_at = self.clock() + STOP_ALONE_S
                     self.owing(True)
                 elif isinstance(waiting.request, Stop):
                     self.owing(False)  # it has arrived, whatever the camera thinks of it
@@ -137,9 +140,14 @@ class Lane:
         self.camera.close()
 
     def _next(self) -> _Waiting | None:
+        """The next request; while a lost camera is owed a stop, the pause between two stops is nobody else's."""
         with self._changed:
-            self._changed.wait_for(lambda: self._closing or self._waiting)
-            return heappop(self._waiting) if self._waiting else None
+            while not self._closing or self._waiting:
+                pause = self._others_at - self.clock()
+                if self._waiting and (self._waiting[0].rank is Rank.STOP or pause <= 0):
+                    return heappop(self._waiting)
+                self._changed.wait(pause if self._waiting else None)
+            return None
 
     def _send(self, request: Request) -> object:
         if isinstance(request, Start | FIRMWARE):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import queue
 import threading
 
+import pytest
+
 from services.bus import Message
 from services.camera.device import DRIVE, Device, stand_still
 from services.camera.requests import (
@@ -146,3 +148,21 @@ def test_the_watchdog_hears_of_a_drive_and_of_its_end() -> None:
     assert told == [DRIVE, None]
     sender.close()
     assert not any(isinstance(request, Stop) for request in control.got)
+
+
+def test_while_a_lost_camera_is_owed_a_stop_the_pause_between_two_tries_is_nobody_elses() -> None:
+    control, pictures = Slow(deaf=1), Slow()
+    sender, inbox = device(control, pictures)
+    control.leave.set()
+    pictures.leave.set()
+    sender.submit(Start(Direction.LEFT), 1)
+    assert reply(inbox).error is None
+    sender.submit(Stop(), 2)
+    assert isinstance(reply(inbox).error, Away)
+    assert [type(control.entered.get(timeout=WAIT_S)) for _ in range(2)] == [Start, Stop]
+    sender.submit(Status(), 3)
+    with pytest.raises(queue.Empty):
+        control.entered.get(timeout=0.3)
+    sender.submit(Stop(), 4)
+    assert [reply(inbox).ticket for _ in range(2)] == [4, 3]
+    sender.close()
