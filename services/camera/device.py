@@ -87,6 +87,7 @@ class Lane:
         self.turning = turning
         self.started = False  # a motion may be running
         self._others_at = 0.0  # until then only a stop is sent
+        self._met = False  # it has told where it looks, and so has been logged in to
         self._driven: Reading | None = None  # the last reading since the firmware began to drive
         self._drives = False
         self._waiting: list[_Waiting] = []
@@ -159,6 +160,9 @@ class Lane:
             self.started = self._drives = False
             self.turning(None)
             self.owing(False)
+        elif isinstance(result, Reading) and not self._met and not self.started:
+            self.turning(None)  # whoever ends motions in our place may make itself known there too
+        self._met = self._met or isinstance(result, Reading)
         return result
 
     def _has_driven(self, reading: Reading) -> bool:

@@ -91,13 +91,14 @@ def connector(name: str, address: Address, gate: Gate) -> Callable[[], Camera]:
 def watch(lines: Iterable[str], connect: Callable[[], Camera], clock: Callable[[], float] = time.time) -> bool:
     """Follows what turns until the lines end, then stops that; whether there was something to stop.
 
-    At the first motion it logs in, so that the stop itself needs one request only.
+    At the first line, which tells that the camera can be reached, it logs in: a stop then needs one request only, and
+    nothing of its own is on the way when a network fails in a motion.
     """
     camera: Camera | None = None
     turning: Direction | Literal["drive"] | None = None
     for line in lines:
         turning = _told(line.strip())
-        if turning is not None and camera is None:
+        if camera is None:
             camera = connect()
             _greet(camera)
     if camera is None:
