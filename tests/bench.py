@@ -10,6 +10,7 @@ import json
 import multiprocessing
 import socket
 import statistics
+import sys
 import tempfile
 import threading
 import time
@@ -170,9 +171,9 @@ def main() -> None:
     for figure in figures:
         table.add_row(figure.name, f"{figure.value:,.0f} {figure.unit}", f"{figure.floor:,.0f} {figure.unit}",
                       f"{figure.ratio:.2f}", f">= {figure.wanted}", figure.floor_is)  # fmt: skip
-    Console().print(table)
+    Console(width=None if sys.stdout.isatty() else 170).print(table)
     moves = goal_figures.rows()
-    Console().print(goals_table(moves))
+    Console(width=None if sys.stdout.isatty() else 170).print(goals_table(moves))
     figured = [{**asdict(figure), "ratio": figure.ratio} for figure in figures]
     given.json.write_text(json.dumps([*figured, *map(asdict, moves)], indent=1))
 
