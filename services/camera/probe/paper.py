@@ -11,8 +11,6 @@ from services.camera.probe import anonymous
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
 
-MEASURED = ("latency_s", "snapshot_s", "tilt_share")
-
 
 def section(found: Findings, name: str, user: str) -> str:
     """The camera's section, as `apartment check` takes it; what could not be found out is a comment."""

@@ -106,17 +106,19 @@ class Helm:
         """How well the place of rest was reckoned, in seconds of the fastest motion before it."""
         pose = self.limits.pose(reading)
         for axis in (PAN, TILT):
-            told, pace = self.course.told[axis], self.skill.paces[axis]
-            fastest = max((pace.rate(abs(one.level)) for one in told if one.level), default=0.0)
+            fastest = self._fastest(axis)
             if fastest > WEIGHED_DEG_S:
                 wrong = max(0.0, abs(pose[axis] - self.course.stopped(axis, FOREVER)) - NOISE_DEG) / fastest
                 self.skill.surprise += SURPRISES * (wrong - self.skill.surprise)
 
     def reckoned(self, axis: int) -> float:
         """How far off the reckoned place of rest of an axis may be, degrees."""
+        return 2 * self.skill.surprise * self._fastest(axis)
+
+    def _fastest(self, axis: int) -> float:
+        """The highest speed that an axis was told since it last stood."""
         told, pace = self.course.told[axis], self.skill.paces[axis]
-        fastest = max((pace.rate(abs(one.level)) for one in told if one.level), default=0.0)
-        return 2 * self.skill.surprise * fastest
+        return max((pace.rate(abs(one.level)) for one in told if one.level), default=0.0)
 
     def _odd(self, reading: Reading) -> bool:
         """Whether a reading at rest is not what was reckoned: it may not be at rest."""

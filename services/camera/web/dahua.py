@@ -23,7 +23,6 @@ from services.camera.web.upload import upload
 
 BEATS = 3.25  # so many heartbeats of silence are the end: three were missed, and one may be late
 SOUND_SILENCE_S = 6.0
-LATE_S = 10.0  # a recording that takes so much longer than it is has hung
 RECEIVE = "/cgi-bin/audio.cgi?action=getAudio&httptype=singlepart&channel=1"  # 1-based whatever the motors want
 SEND = "/cgi-bin/audio.cgi?action=postAudio&httptype=singlepart&channel=1"
 CODECS = {"g.711a": g711.A_LAW, "g.711mu": g711.MU_LAW}

@@ -15,7 +15,6 @@ from services.simulators.camera.messages import Answer
 
 SOAP = "http://www.w3.org/2003/05/soap-envelope"
 WSSE = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-wssecurity-secext-1.0.xsd"
-WSU = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-wssecurity-utility-1.0.xsd"
 NAMES = {
     "env": SOAP,
     "tds": "http://www.onvif.org/ver10/device/wsdl",
