@@ -22,6 +22,7 @@ from services.home import Home
 from services.persistence import rows, strategies
 from services.persistence.connection import Connection
 from services.persistence.decisions import Decisions
+from services.persistence.seen import Seen
 from services.persistence.strategies import Restore
 from services.runner import Post
 from services.section import Section
@@ -30,7 +31,7 @@ from services.storage import Address, Batch, Row, Storage, open_storage, read_ad
 log = logging.getLogger(__name__)
 
 CLOCK_STEP_US = 1_000_000  # a clock that steps back more than this is told
-COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "restored", "reconnects")
+COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "restored", "reconnects", "redelivered")
 
 
 class Config(Section):
@@ -68,6 +69,7 @@ def start(config: Config, post: Post) -> Iterator[Persistence]:
     address = config.address
     service = Persistence(config, lambda: open_storage(address))
     service.connection.first()
+    service.prepare()
     try:
         yield service
     finally:
@@ -85,10 +87,21 @@ class Persistence:
         self._home = config.home
         self._decisions = Decisions(config.home, self.counters)
         self._restore = Restore(self._decisions.restored, config.restore_after_s)
-        self._gathered: list[rows.State | Row] = []
+        self._gathered: list[tuple[rows.State | Row, Message]] = []
+        self._fresh: list[rows.State | Row] = []  # of it what is not there already
+        self._seen = Seen(config.name)
+        self._name = config.name
         self._batch = Batch()  # decided, not committed yet
         self._time = 0
         self._learnt = False
+
+    def prepare(self) -> None:
+        """Learns the last values before the first message, where the database is there: its times go on from those."""
+        if (storage := self.connection.opened) is not None:
+            try:
+                self._learn(storage)
+            except Unavailable as error:
+                log.warning("the database went away at the start: %s", error)
 
     @property
     def due(self) -> float | None:
@@ -104,7 +117,7 @@ class Persistence:
             return ()
         row = rows.read(known, self._next_time(message.received or now), self._home) if known.topic.stored else None
         if row is not None:
-            self._gathered.append(row)
+            self._gathered.append((row, message))
         return ()
 
     def tick(self, now: float) -> list[Message]:
@@ -137,32 +150,45 @@ class Persistence:
         last = storage.last_values()
         self._decisions.learn(last, storage.last_diagnostics())
         self._time = max([self._time, *(sample.time for sample in last.values())])
+        self._seen.learn(storage.seen(self._name))
         self._learnt = True
 
     def _decide(self, storage: Storage) -> None:
         """From gathered to decided, once; new items are made before, because MariaDB commits at that."""
-        if self._gathered:
-            storage.add_items(self._decisions.new_items(self._gathered, storage.items))
-            self._batch.extend(self._decisions.batch(self._gathered, storage.items))
-            self._gathered = []
+        for row, message in self._gathered:
+            if self._seen.is_second(message):
+                self.counters["redelivered"] += 1
+            else:
+                self._fresh.append(row)
+        self._gathered = []
+        if self._fresh:
+            storage.add_items(self._decisions.new_items(self._fresh, storage.items))
+            self._batch.extend(self._decisions.batch(self._fresh, storage.items))
+            self._fresh = []
 
     def _commit(self, storage: Storage) -> None:
         if len(self._batch):
+            self._batch.seen = self._seen.turn()
             self.counters["rows"] += self._write(storage, self._batch)
+            self._seen.committed()
             self.counters["batches"] += 1
             self._batch = Batch()
 
     def _write(self, storage: Storage, batch: Batch) -> int:
         """How many rows were written: all, but for one that the database refuses, which halving finds."""
+        written = 0
         try:
             storage.write(batch)
             return len(batch)
         except BadMessage as error:
             if len(batch) > 1:
-                return sum(self._write(storage, half) for half in batch.halves())
-            log.warning("refused by the database: %s: %.200r", error, batch)
-            self.counters["refused"] += 1
-            return 0
+                written = sum(self._write(storage, half) for half in batch.halves())
+            else:
+                log.warning("refused by the database: %s: %.200r", error, batch.samples or batch.rows)
+                self.counters["refused"] += 1
+        if batch.seen is not None:
+            storage.write(Batch(seen=batch.seen))
+        return written
 
     def _restored(self, storage: Storage, now: float) -> list[Message]:
         """The last states of items that the broker does not have, retained, said once."""

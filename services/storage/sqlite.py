@@ -13,7 +13,7 @@ from dataclasses import astuple, fields
 from typing import Any
 
 from services.errors import BadMessage, ConfigError, Unavailable
-from services.storage import FINAL_STATES, TABLES, Address, Batch, Diagnostic, Item, Sample, Sighting
+from services.storage import FINAL_STATES, TABLES, Address, Batch, Diagnostic, Item, Sample, SeenTurn, Sighting
 from services.storage.migrate import migrate
 
 BUSY_S = 5.0
@@ -84,6 +84,8 @@ def open_address(address: Address) -> SqliteStorage:
 class SqliteStorage:
     """See `Storage` for what each method promises."""
 
+    dialect = "sqlite"
+
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._connection = connection
         self._items: dict[str, Item] = {}
@@ -121,6 +123,26 @@ class SqliteStorage:
             )
             for row in batch.rows:
                 self._connection.execute(INSERT[TABLES[type(row)]], astuple(row))
+            if batch.seen is not None:
+                self._connection.execute("REPLACE INTO mqtt_seen VALUES (?, ?, ?, ?)", astuple(batch.seen))
+
+    def read(self, statement: str) -> list[tuple[Any, ...]]:
+        """See `Storage`."""
+        with _translated():
+            return self._rows(statement)
+
+    def change(self, *statements: str) -> int:
+        """See `Storage`."""
+        changed = 0
+        with _translated(), self._transaction():
+            for statement in statements:
+                changed = self._connection.execute(statement).rowcount
+        return changed
+
+    def seen(self, client: str) -> list[SeenTurn]:
+        """See `Storage`."""
+        with _translated():
+            return [SeenTurn(*row) for row in self._rows("SELECT * FROM mqtt_seen WHERE client=?", client)]
 
     def last(self, item: str) -> Sample | None:
         """See `Storage`."""
