@@ -62,6 +62,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.client": (*CORE, *BUSES, *SHELL),
     "services.peers": (*CORE, "services.access"),
     "services.simulated": (*CORE, *SHELL, "services.client", "services.peers", "services.supervisor"),
+    "services.stored": ("services",),
     "services.virtual": ("services",),
     "services.demo": ("services",),
     "services.pytest_plugin": ("services",),
@@ -95,7 +96,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),
-    "typer": ("services.__main__",),
+    "typer": ("services.__main__", "services.stored"),
     "rich": ("services.__main__", "services.camera.ptz.command", "services.demo", "services.camera.probe."),
     "starlette": ("services.dashboard.http",),
     "uvicorn": ("services.dashboard.http",),
@@ -130,7 +131,8 @@ PURE = (
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
     "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules",
-    "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
+    "services.persistence.rows", "services.persistence.seen", "services.persistence.strategies",
+    "services.history.answers", "services.history.plot", "services.storage.reading", "services.openhab.generate",
     "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",
     "services.simulators.devices", "services.simulators.life",
 )  # fmt: skip
@@ -139,7 +141,7 @@ IMPURE = (
     "threading", "time", "urllib",
 )  # fmt: skip
 
-PRINTS = ("services.__main__",)
+PRINTS = ("services.__main__", "services.stored")
 CATCHES_ALL = ("services.supervisor",)
 VALIDATORS = (
     "field_validator",
