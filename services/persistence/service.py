@@ -19,11 +19,11 @@ from services import topics
 from services.bus import Message
 from services.errors import BadMessage, ConfigError, Unavailable
 from services.home import Home
-from services.persistence import rows, strategies
+from services.persistence import rows, rulebook, strategies
 from services.persistence.connection import Connection
 from services.persistence.decisions import Decisions
 from services.persistence.seen import Seen
-from services.persistence.strategies import Restore
+from services.persistence.strategies import Restore, Rule, Timetable
 from services.runner import Post
 from services.section import Section
 from services.storage import Address, Batch, Row, Storage, open_storage, read_address
@@ -42,6 +42,7 @@ class Config(Section):
     view_database: str = "OpenHAB"  # where the views with OpenHAB's layout go (MariaDB, MySQL)
     restore_after_s: float = Field(default=2.0, ge=0)  # how long the broker may take for its retained states
     name: str = "persistence"
+    strategies: Path | None = None  # persistence.yaml; without it `persist` of each item in home.yaml says when
     home: Home
     folder: Path = Path()
 
@@ -60,12 +61,23 @@ class Config(Section):
         password = self.password.get_secret_value() if self.password else None
         return read_address(self.url, password=password, view_database=self.view_database, folder=self.folder)
 
+    @property
+    def rules(self) -> dict[str, Rule]:
+        """The rule of every item; ConfigError when the file of strategies has faults."""
+        return rulebook.rules(self.home, self.folder / self.strategies if self.strategies else None)
+
+
+def check(config: Config) -> None:
+    """ConfigError with every fault of the strategies."""
+    if faults := list(strategies.faults(config.home)):
+        raise ConfigError(faults)
+    assert config.rules is not None
+
 
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[Persistence]:
     """The service; ConfigError when its database cannot be used. One that is away is waited for in the turns."""
-    if faults := list(strategies.faults(config.home)):
-        raise ConfigError(faults)
+    check(config)
     address = config.address
     service = Persistence(config, lambda: open_storage(address))
     service.connection.first()
@@ -85,7 +97,9 @@ class Persistence:
         self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self.connection = Connection(opener, self.counters)
         self._home = config.home
-        self._decisions = Decisions(config.home, self.counters)
+        rules = config.rules
+        self._timetable = Timetable(rules)
+        self._decisions = Decisions(config.home, rules, self.counters)
         self._restore = Restore(self._decisions.restored, config.restore_after_s)
         self._gathered: list[tuple[rows.State | Row, Message]] = []
         self._fresh: list[rows.State | Row] = []  # of it what is not there already
@@ -105,18 +119,20 @@ class Persistence:
 
     @property
     def due(self) -> float | None:
-        """When the database is tried again, or the restoring is due."""
-        wanted = [when for when in (self.connection.due, self._restore.due) if when is not None]
+        """When the database is tried again, or the restoring or a cron strategy is due."""
+        if self.connection.due is not None:
+            return self.connection.due
+        wanted = [when for when in (self._restore.due, self._timetable.due) if when is not None]
         return min(wanted, default=None)
 
     def handle(self, message: Message, now: float) -> tuple[Message, ...]:
         """Takes a message for the next tick."""
         known = topics.read(message, now)
         self._restore.begin(now)
-        if known.topic is topics.HOME_STATE and self._restore.saw(known.levels["item"], known.payload):
-            return ()
         row = rows.read(known, self._next_time(message.received or now), self._home) if known.topic.stored else None
-        if row is not None:
+        if isinstance(row, rows.State) and self._restore.saw(row.item, row.text):
+            self._decisions.heard(row)
+        elif row is not None:
             self._gathered.append((row, message))
         return ()
 
@@ -126,6 +142,8 @@ class Persistence:
         try:
             self._learn(storage)
             self._decide(storage)
+            if fired := self._timetable.fired(now):
+                self._batch.extend(self._decisions.fired(fired, storage.items, lambda: self._next_time(now)))
             self._commit(storage)
         except Unavailable as error:
             self.connection.lost(error, now)
