@@ -16,7 +16,7 @@ from services.storage.address import Address, read_address
 
 __all__ = [
     "Address", "Batch", "CameraOrder", "Diagnostic", "Item", "Row", "Sample", "Scan", "SeenTurn", "Sighting", "Storage",
-    "open_storage", "read_address",
+    "open_plain", "open_storage", "read_address",
 ]  # fmt: skip
 BACKENDS = {"mysql": "services.storage.mysql", "sqlite": "services.storage.sqlite"}
 
@@ -176,6 +176,13 @@ class Storage(Protocol):
         """Runs statements in one transaction; how many rows the last of them changed."""
         ...
 
+    def quote(self, text: str) -> str:
+        """A text as a literal of the database's SQL."""
+        ...
+
+    def remake_views(self) -> None:
+        """Makes the views with OpenHAB's layout anew: somebody may have changed or lost them."""
+
     def seen(self, client: str) -> list[SeenTurn]:
         """What a writer's last turns handled, in no order."""
         ...
@@ -223,4 +230,10 @@ def open_storage(address: Address | str, folder: Path = Path()) -> Storage:
     if isinstance(address, str):
         address = read_address(address, folder=folder)
     storage: Storage = import_module(BACKENDS[address.dialect]).open_address(address)
+    return storage
+
+
+def open_plain(address: Address) -> Storage:
+    """Opens a database that is not ours, or as its administrator: only `read`, `change`, `quote` and `close` work."""
+    storage: Storage = import_module(BACKENDS[address.dialect]).open_plain(address)
     return storage

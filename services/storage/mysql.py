@@ -60,13 +60,19 @@ def open_address(address: Address) -> MysqlStorage:
     return storage
 
 
+def open_plain(address: Address) -> MysqlStorage:
+    """Connects to a database of somebody else, or as its administrator: nothing is made, checked or learnt."""
+    with _translated(opening=True):
+        return MysqlStorage(address, _connect(address))
+
+
 def _connect(address: Address) -> pymysql.Connection[Any]:
     tls: dict[str, Any] = {}
     if address.ssl_ca:
         tls = {"ssl_ca": address.ssl_ca, "ssl_verify_cert": True, "ssl_verify_identity": True}
     return pymysql.connect(
         host=address.host, port=address.port, unix_socket=address.socket, user=address.user,
-        password=address.password or "", database=address.database, charset="utf8mb4", init_command=SESSION,
+        password=address.password or "", database=address.database or None, charset="utf8mb4", init_command=SESSION,
         autocommit=False, local_infile=False, connect_timeout=CONNECT_TIMEOUT_S, read_timeout=ANSWER_TIMEOUT_S,
         write_timeout=ANSWER_TIMEOUT_S, **tls,
     )  # fmt: skip
@@ -124,6 +130,17 @@ class MysqlStorage:
         """See `Storage`."""
         escaped = self._connection.escape(client)
         return [SeenTurn(*row) for row in self.read(f"SELECT {sql.SEEN} FROM mqtt_seen WHERE client={escaped}")]
+
+    def quote(self, text: str) -> str:
+        """See `Storage`."""
+        return self._connection.escape(text)
+
+    def remake_views(self) -> None:
+        """See `Storage`."""
+        with _translated():
+            self._connection.query(sql.items_view(self._address.database, self._address.view_database))
+            for item in self._items.values():
+                self._make_view(item)
 
     def last(self, item: str) -> Sample | None:
         """See `Storage`."""

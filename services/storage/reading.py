@@ -63,6 +63,16 @@ def before(storage: Storage, item: Item, until: int) -> Sample | None:
     return Sample(item.name, *rows[0]) if rows else None
 
 
+def oldest(storage: Storage, item: Item, since: int, limit: int) -> list[Sample]:
+    """The oldest samples of an item from a time on: for going through all of them in pieces."""
+    sql = DIALECTS[storage.dialect]
+    rows = storage.read(
+        f"SELECT {sql.micro.format('s.time')}, s.num, s.text FROM sample s WHERE s.item_id={item.item_id} "
+        f"AND s.time>={sql.at(max(since, SECOND))} ORDER BY s.time LIMIT {int(limit)}"
+    )
+    return [Sample(item.name, *row) for row in rows]
+
+
 def all_before(storage: Storage, until: int) -> dict[str, Sample]:
     """The same of every item that has one."""
     sql = DIALECTS[storage.dialect]
