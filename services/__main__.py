@@ -22,6 +22,7 @@ from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult, stamp
 from services.supervisor import Supervisor, commands, processes
+from services.topics import page
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -94,14 +95,14 @@ def topics_(
 ) -> None:
     """Show the table of topics, or write the files that come from it and from the accounts of the configuration."""
     if write is not None:
-        write.write_text(topics.markdown(), encoding="utf-8")
+        write.write_text(page.markdown(), encoding="utf-8")
     if acl is not None:
         acl.write_text(access.acl(load(config).cameras), encoding="utf-8")
     if passwords is not None:
         accounts = load(config).bus.accounts
         access.write_passwords(passwords, {name: one.get_secret_value() for name, one in accounts.items() if one})
     if write is acl is passwords is None:
-        _say(topics.markdown())
+        _say(page.markdown())
 
 
 @app.command(epilog="Example: apartment status --json")

@@ -1,4 +1,4 @@
-"""The payloads that travel as JSON: one frozen model each. Which topic carries which is in `topics.py`.
+"""The payloads that travel as JSON: one frozen model each. Which topic carries which is in `topics/`.
 
 Times are ISO 8601 in UTC with milliseconds and `Z`; angles are degrees as the camera reads them; lengths metres.
 """

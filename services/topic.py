@@ -1,6 +1,6 @@
 """What a row of the table of topics is: pattern, kind, payload, roles; and the messages that it makes.
 
-Not here: the rows, and reading what comes; that is `topics.py`.
+Not here: the rows, and reading what comes; that is `topics/`.
 """
 
 from __future__ import annotations

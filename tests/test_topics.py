@@ -15,7 +15,7 @@ from services.bus import Message, topic_matches
 from services.errors import BadMessage
 from services.payloads import Diagnostic, Order, PositionSet
 from services.topic import LEVELS, STALE_AFTER_S, Kind, Topic
-from services.topics import BLOB_LIMIT, TABLE, TEXT_LIMIT, find, read
+from services.topics import BLOB_LIMIT, TABLE, TEXT_LIMIT, find, page, read
 
 NOW = 1_769_839_500.0
 ROWS = [pytest.param(row, id=row.pattern) for row in TABLE]
@@ -247,6 +247,6 @@ def test_an_answer_goes_to_the_one_who_asked() -> None:
 
 
 def test_the_page_for_people_has_a_row_for_every_topic() -> None:
-    page = topics.markdown()
+    text = page.markdown()
     for row in TABLE:
-        assert page.count(f"| `{row.pattern}` |") == 1
+        assert text.count(f"| `{row.pattern}` |") == 1
