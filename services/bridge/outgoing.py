@@ -32,8 +32,9 @@ class Outgoing:
 
     @property
     def listeners(self) -> int:
-        """How many listen."""
-        return len(self._greeted)
+        """How many listen, without those who left since."""
+        here = self._connections()
+        return sum(one in here for one in self._greeted)
 
     def say(self, data: bytes, key: str | None = None) -> None:
         """A message with its length before it; `key`: kept for who comes, instead of the older one of that key."""

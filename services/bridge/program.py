@@ -11,17 +11,20 @@ from typing import Any
 from pydantic import Field, ValidationError, field_validator
 
 from services import __version__
-from services.bridge import arguments, messages, rulebook
+from services.bridge import arguments, mapfile, messages, rulebook
 from services.bridge.confirm import Confirm
+from services.bridge.darkroom import Wanted
 from services.bridge.items import Items
 from services.bridge.node import Outlet, Ports, ports
 from services.bridge.part import Part
+from services.bridge.pictures import Pictures
 from services.bridge.ros import RosNode
 from services.bridge.rules import Rule
 from services.bridge.service import Bridge
 from services.bridge.simulated import SimulatedNode
 from services.bridge.snapshots import Snapshots
 from services.bridge.tree import Tree
+from services.errors import ConfigError
 from services.home import Home
 from services.runner import Post
 from services.section import Section
@@ -44,6 +47,7 @@ class Config(Section):
     node: str = Field(default="iot_bridge", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # its name in the ROS graph
     master_uri: str | None = None  # http://host:11311; without it ROS_MASTER_URI of the environment
     apartment: tuple[float, float, float] = (0.0, 0.0, 0.0)  # its origin on the robot's map: x, y in m, yaw in degrees
+    map: Path | None = None  # a map_server YAML, shown on /map; relative to the configuration
     simulated: bool = False  # a ROS node in memory, where there is no ROS
     name: str = "bridge"
     home: Home
@@ -66,7 +70,17 @@ class Config(Section):
 def check(config: Config) -> None:
     """ConfigError with every fault of the rules; their types are checked where ROS is installed."""
     known = _types(config) if importlib.util.find_spec("genpy") else rulebook.unchecked
-    rulebook.load(config.folder / config.rules, config.cameras, known)
+    faults: list[str] = []
+    for load in (
+        lambda: rulebook.load(config.folder / config.rules, config.cameras, known),
+        lambda: mapfile.load(config.folder / config.map) if config.map else None,
+    ):
+        try:
+            load()
+        except ConfigError as error:
+            faults += error.faults
+    if faults:
+        raise ConfigError(faults)
 
 
 @contextmanager
@@ -92,7 +106,20 @@ def _parts(config: Config) -> tuple[Part, ...]:
         mounts = {cam: one.mount for cam, one in config.camera_sections.items() if one.mount is not None}
         snapshots = config.state / "snapshots" if config.state else None
         parts += [Tree(config.cameras, mounts, config.apartment), Snapshots(config.cameras, snapshots)]
+    if not config.simulated and (config.cameras or config.map):
+        parts.append(Pictures(_wanted(config)))
     return tuple(parts)
+
+
+def _wanted(config: Config) -> Wanted:
+    """What the process for pictures is to do."""
+    files = {cam: one.camera_info for cam, one in config.camera_sections.items() if one.camera_info is not None}
+    cameras = {
+        cam: ("" if cam == config.cameras[0] else f"/{cam}", config.folder / files[cam] if cam in files else None)
+        for cam in config.cameras
+    }
+    map_file = config.folder / config.map if config.map else None
+    return Wanted(f"{arguments.name(config.node)}_pictures", config.master_uri, cameras, map_file)
 
 
 def _all_ports(config: Config, rules: tuple[Rule, ...], parts: tuple[Part, ...]) -> Ports:
