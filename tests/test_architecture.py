@@ -131,7 +131,7 @@ PURE = (
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
     "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules", "services.bridge.frames", "services.bridge.multipart",
-    "services.bridge.confirm", "services.bridge.items", "services.bridge.template",
+    "services.bridge.confirm", "services.bridge.pace", "services.bridge.items", "services.bridge.template",
     "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
     "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",
     "services.simulators.devices", "services.simulators.life",

@@ -7,7 +7,7 @@ parts (`part.py`). The ROS side is a `Node`, by rospy or simulated. How all is p
 from __future__ import annotations
 
 import logging
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
@@ -15,6 +15,7 @@ from services import states, topics
 from services.bridge import rulebook
 from services.bridge.health import Health
 from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Node
+from services.bridge.pace import Pace
 from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard, Rule, read, to_mqtt, to_ros
 from services.bus import Message
@@ -43,7 +44,12 @@ class Bridge:
         self.counters: Counter[str] = Counter(to_ros=0, to_mqtt=0, refused=0)
         self._home = home
         self._to_ros = tuple(rule for rule in rules if rule.direction == "to_ros")
-        self._to_mqtt = tuple(rule for rule in rules if rule.direction == "to_mqtt")
+        self._to_mqtt: defaultdict[str, list[Rule]] = defaultdict(list)
+        for rule in rules:
+            if rule.direction == "to_mqtt":
+                self._to_mqtt[rule.ros].append(rule)
+        self._slow_to_ros: Pace[tuple[str, Fields, str]] = Pace()
+        self._slow_to_mqtt: Pace[Message] = Pace()
         rows = (topics.DIAGNOSTICS, *(row for part in parts for row in part.rows))
         self.subscribes = tuple(dict.fromkeys([*(rule.filter for rule in self._to_ros), *(row.filter for row in rows)]))
         self._listening = {row: tuple(part for part in parts if row in part.rows) for row in rows}
@@ -56,7 +62,8 @@ class Bridge:
     @property
     def due(self) -> float:
         """See `Service`."""
-        return min([self._own_due, self._next_array, *(part.due for part in self.parts)])
+        slow = self._slow_to_ros.due, self._slow_to_mqtt.due
+        return min([self._own_due, self._next_array, *slow, *(part.due for part in self.parts)])
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
         """See `Service`; a refused message from ROS is a BadMessage, and a warning in `diagnostics/bridge`."""
@@ -75,6 +82,7 @@ class Bridge:
         """Both diagnostics once a second, our own sooner when there is news; and sends all that this turn said."""
         if self._health.link.ended:
             raise GivenUp(f"bridge: {self._health.link.text}")
+        yield from self._what_waited(now)
         for part in self.parts:
             yield from part.tick(self.node, now)
         if now >= self._next_array:
@@ -103,20 +111,33 @@ class Bridge:
             return
         for part in self._listening.get(heard.row, ()) if heard.row else ():
             part.hear(heard, now)
-        faults = [fault for rule in self._rules_for(message.topic) if (fault := self._apply(rule, heard))]
+        faults = [fault for rule in self._rules_for(message.topic) if (fault := self._apply(rule, heard, now))]
         if faults:
             raise faults[0]
 
-    def _apply(self, rule: Rule, heard: Heard) -> BadMessage | None:
+    def _apply(self, rule: Rule, heard: Heard, now: float) -> BadMessage | None:
         """One rule's fault does not keep the others from theirs."""
+        topic = heard.message.topic
         try:
             fields = to_ros(rule, heard)
+            if fields is not None and rule.rate is not None:
+                said = self._slow_to_ros.take((rule.ros, topic), rule.rate, (rule.ros, fields, topic), now)
+                fields = said[1] if said else None
             if fields is not None:
-                self.node.publish(rule.ros, fields, key=heard.message.topic)
+                self.node.publish(rule.ros, fields, key=topic)
                 self.counters["to_ros"] += 1
         except BadMessage as error:
-            return BadMessage(f"{heard.message.topic} to {rule.ros}: {error}")
+            return BadMessage(f"{topic} to {rule.ros}: {error}")
         return None
+
+    def _what_waited(self, now: float) -> Iterator[Message]:
+        """What came faster than its rule allows, as far as its time has come."""
+        for topic, fields, key in self._slow_to_ros.ready(now):
+            self.node.publish(topic, fields, key=key)
+            self.counters["to_ros"] += 1
+        for message in self._slow_to_mqtt.ready(now):
+            self.counters["to_mqtt"] += 1
+            yield message
 
     def _find_rules(self, topic: str) -> tuple[Rule, ...]:
         return tuple(rule for rule in self._to_ros if rule.pattern.fullmatch(topic))
@@ -130,9 +151,9 @@ class Bridge:
 
     def _from_ros(self, topic: str, fields: Fields, now: float) -> list[Message]:
         try:
-            wanted = [to_mqtt(rule, fields, now) for rule in self._to_mqtt if rule.ros == topic]
-            allowed = [message for message in wanted if not self._is_refresh(message)]
-            for message in allowed:
+            wanted = [(rule, to_mqtt(rule, fields, now)) for rule in self._to_mqtt[topic]]
+            asked = [(rule, message) for rule, message in wanted if not self._is_refresh(message)]
+            for _, message in asked:
                 self._check_home(message)
         except BadMessage as error:
             self.counters["refused"] += 1
@@ -140,13 +161,20 @@ class Bridge:
             self._health.refused(text, now)
             self._soon()
             raise BadMessage(text) from error
-        if len(allowed) < len(wanted):
+        if len(asked) < len(wanted):
             self.node.refresh()
+        allowed = [message for rule, message in asked if self._may_go(rule, message, now)]
         self.counters["to_mqtt"] += len(allowed)
         for message in allowed:
             for part in self.parts:
                 part.said(message, now)
         return allowed
+
+    def _may_go(self, rule: Rule, message: Message, now: float) -> bool:
+        """Whether it may go now; otherwise it waits until it may."""
+        if rule.rate is None:
+            return True
+        return self._slow_to_mqtt.take((rule.ros, message.topic), rule.rate, message, now) is not None
 
     def _is_refresh(self, message: Message) -> bool:
         row, levels = _known(message.topic)

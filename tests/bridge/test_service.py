@@ -18,6 +18,14 @@ from services.errors import BadMessage
 
 CONFIG = Path(__file__).parents[2] / "config"
 NOW = 1000.0
+OWN_RULES = """
+  - {direction: to_ros, mqtt: 'lab/{bench}/temp', ros: lab/{0}, type: std_msgs/Float64, fields: {data: '{payload}'},
+     rate: 2, replay: true}
+  - {direction: to_mqtt, ros: lab/goal, type: geometry_msgs/PoseStamped, mqtt: lab/goal, rate: 2, qos: 0, retain: true,
+     payload: {x: '{pose.position.x}', frame: '{header.frame_id}'}}
+  - {direction: to_ros, mqtt: lab/where, ros: lab/where, type: geometry_msgs/PoseStamped,
+     fields: {header: {stamp: '{payload.at}', frame_id: map}, pose: {position: '{payload.position}'}}}
+""".replace("{0}", "temp")
 HOME = {
     "items": {
         "Lamp": {"type": "Switch", "label": "Lamp"},
@@ -278,3 +286,39 @@ def test_a_topic_that_only_looks_like_ours_is_no_crash(bridge: Driven, topic: st
         assert bridge.hears(topic, "payload") == []
     except BadMessage:
         assert topic == "home/a/b/c"
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Iterator[Driven]:
+    """A bridge with rules of its owner's own."""
+    (tmp_path / "bridge.yaml").write_text((CONFIG / "bridge.yaml").read_text(encoding="utf-8") + OWN_RULES)
+    config = Config.model_validate({"home": HOME, "cameras": ("ip1",), "folder": tmp_path, "simulated": True})
+    posted: list[Message] = []
+    with start(config, posted.append) as service:
+        driven = Driven(service, posted)
+        driven.take()
+        yield driven
+
+
+def test_what_comes_faster_than_its_rule_allows_waits_and_only_the_newest_goes(lab: Driven) -> None:
+    assert lab.hears("lab/a/temp", "1", NOW) == [("/lab/temp", {"data": "1"})]
+    assert lab.hears("lab/b/temp", "7", NOW) == [("/lab/temp", {"data": "7"})], "each topic has its own time"
+    assert lab.hears("lab/a/temp", "2", NOW + 0.1) == lab.hears("lab/a/temp", "3", NOW + 0.2) == []
+    list(lab.service.tick(NOW + 0.4))
+    assert ("/lab/temp", {"data": "3"}) not in lab.node.published
+    assert lab.service.due <= NOW + 0.5
+    list(lab.service.tick(NOW + 0.5))
+    assert [fields for topic, fields in lab.node.published if topic == "/lab/temp"] == [{"data": "3"}]
+
+
+def test_a_robots_word_waits_too_where_its_rule_says_so(lab: Driven) -> None:
+    def says(x: float, now: float) -> list[Message]:
+        lab.node.send("/lab/goal", {"pose": {"position": {"x": x}}, "header": {"frame_id": "map"}})
+        return [out for message in lab.take() for out in lab.service.handle(message, now)]
+
+    (first,) = says(1.0, NOW)
+    assert (first.topic, first.retain, first.qos) == ("lab/goal", True, 0)
+    assert json.loads(first.payload) == {"x": 1.0, "frame": "map"}
+    assert says(2.0, NOW + 0.1) == says(3.0, NOW + 0.2) == []
+    later = [message for message in lab.service.tick(NOW + 0.6) if message.topic == "lab/goal"]
+    assert [json.loads(message.payload)["x"] for message in later] == [3.0]
