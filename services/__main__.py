@@ -246,6 +246,10 @@ def _ended(result: OrderResult, json: bool) -> None:
 
 def main() -> None:
     """Runs the command line; every error of ours becomes a line and an exit code, never a traceback."""
+    if any(":=" in one for one in sys.argv):
+        from services.bridge import arguments  # roslaunch starts us
+
+        sys.argv[1:] = arguments.take(sys.argv[1:])
     try:
         app(standalone_mode=True)
     except ConfigError as error:
