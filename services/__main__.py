@@ -18,6 +18,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, topics
 from services.bus import Message
+from services.command_line import mission
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult, stamp
@@ -195,6 +196,7 @@ def probe(
     command.run(out, target, out_folder or Path(f"probe-{camera}"), yes_move=yes_move, json_only=json)
 
 
+app.add_typer(mission.app, name="mission")
 calibrate = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
 app.add_typer(calibrate, name="calibrate")
 
