@@ -33,7 +33,11 @@ def virtual_flat(folder: Path, changes: Mapping[str, str] | None = None) -> Iter
     config = Path(shutil.copytree(CONFIG, folder / "config")) / "simulated.yaml"
     for old, new in (changes or {}).items():
         config.write_text(config.read_text().replace(old, new))
-    own = {"APARTMENT_DATABASE": f"sqlite:///{folder}/bus.db", "APARTMENT_WITHOUT_ROS": "true"}
+    own = {
+        "APARTMENT_DATABASE": f"sqlite:///{folder}/bus.db",
+        "APARTMENT_STATE": str(folder / "state"),
+        "APARTMENT_WITHOUT_ROS": "true",
+    }
     with VirtualApartment(config, own) as flat:
         yield flat
 
