@@ -71,4 +71,5 @@ def eye(config: Config) -> Eye:
         except (ValueError, AttributeError) as error:
             raise ConfigError([f"{file}:1: {error}"]) from error
     mount = config.mount.mount() if config.mount else None
-    return Eye(config.name, config.dictionary, lens, mount, config.zoom_range[0])
+    noise = config.reading_noise_deg
+    return Eye(config.name, config.dictionary, lens, mount, config.zoom_range[0], angle_noise_deg=noise)

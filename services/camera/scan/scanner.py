@@ -20,7 +20,7 @@ from services.camera.requests import GetPicture, Picture, Refused
 from services.camera.scan import sightings
 from services.camera.scan.analysis import Analysed, Analyst, Task
 from services.camera.scan.search import Frame, Scan, Take, shortest, snapshot
-from services.camera.scan.sightings import Eye
+from services.camera.scan.sightings import Eye, Sought
 from services.camera.scan.streamed import Streamed
 from services.camera.settings import Config
 from services.payloads import OrderState, Place, ScanState
@@ -157,10 +157,11 @@ class Scanner:
 
     def _results(self, scan: Scan) -> None:
         for marker, seen in sorted(scan.seen.items()):
-            size = self.config.markers.of(marker)
-            result = sightings.result(self.eye, marker, seen, size, scan.name, self.picture.mode)
-            self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
-            self._publish(topics.CAMERA_MARKER.message(result, cam=self.config.name, marker=marker))
+            sought = Sought(marker, self.config.markers.of(marker), self.config.markers.prior(marker))
+            results = sightings.results(self.eye, sought, seen, scan.name, self.picture.mode)
+            for result in results:
+                self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
+            self._publish(topics.CAMERA_MARKER.message(results[0], cam=self.config.name, marker=marker))
 
     def _say(self, state: ScanState) -> None:
         self.bulletin.say(topics.CAMERA_SCAN_STATE, state)
