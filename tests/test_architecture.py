@@ -62,6 +62,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.client": (*CORE, *BUSES, *SHELL),
     "services.peers": (*CORE, "services.access"),
     "services.simulated": (*CORE, *SHELL, "services.client", "services.peers", "services.supervisor"),
+    "services.stored": ("services",),
     "services.virtual": ("services",),
     "services.demo": ("services",),
     "services.pytest_plugin": ("services",),
@@ -88,14 +89,16 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.vision.",
         "services.camera.video.",
         "services.bridge.images",
+        "services.bridge.mapfile",
         "services.simulators.camera.",
     ),
     "av": ("services.camera.video.rtsp",),
     "gi": ("services.simulators.camera.rtsp.",),
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
+    "croniter": ("services.persistence.cron",),
     "yaml": ("services.document",),
-    "typer": ("services.__main__",),
+    "typer": ("services.__main__", "services.stored"),
     "rich": ("services.__main__", "services.camera.ptz.command", "services.demo", "services.camera.probe."),
     "starlette": ("services.dashboard.http",),
     "uvicorn": ("services.dashboard.http",),
@@ -124,13 +127,16 @@ MOVING = (
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
     "services.bus", "services.vision.", *(f"services.camera.ptz.{part}" for part in MOVING),
-    "services.camera.scan.search",
+    "services.camera.scan.search", "services.camera.scan.route", "services.camera.scan.stillness",
     "services.camera.video.timing",
     "services.camera.brands.dahua.", "services.camera.alarm.motion", "services.camera.sound.g711",
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
     "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
-    "services.camera.discovery", "services.bridge.rules",
-    "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
+    "services.camera.discovery", "services.bridge.rules", "services.bridge.frames", "services.bridge.multipart",
+    "services.bridge.confirm", "services.bridge.pace", "services.bridge.items", "services.bridge.template",
+    "services.persistence.rows", "services.persistence.seen", "services.persistence.strategies",
+    "services.persistence.cron", "services.persistence.filters", "services.persistence.decisions",
+    "services.history.answers", "services.history.plot", "services.storage.reading", "services.openhab.generate",
     "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",
     "services.simulators.devices", "services.simulators.life",
 )  # fmt: skip
@@ -139,7 +145,7 @@ IMPURE = (
     "threading", "time", "urllib",
 )  # fmt: skip
 
-PRINTS = ("services.__main__",)
+PRINTS = ("services.__main__", "services.stored")
 CATCHES_ALL = ("services.supervisor",)
 VALIDATORS = (
     "field_validator",
