@@ -164,8 +164,8 @@ def photograph(flat: Flat, pose: Transform, times: float, rng: np.random.Generat
 
 
 def _delivered(flat: Flat, still: np.ndarray, size: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-    noisy = still.astype(np.float32) * flat.light + rng.normal(0, flat.noise, still.shape)
-    image = np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+    grain = rng.standard_normal((*still.shape[:2], 1), np.float32) * np.float32(flat.noise)
+    image = cv2.add(cv2.convertScaleAbs(still, alpha=flat.light), np.repeat(grain, 3, axis=2), dtype=cv2.CV_8U)
     if (image.shape[1], image.shape[0]) != size:
         image = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
