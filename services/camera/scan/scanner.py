@@ -21,7 +21,7 @@ from services.camera.scan import sightings
 from services.camera.scan.analysis import Analysed, Analyst, Task
 from services.camera.scan.route import shortest
 from services.camera.scan.search import Frame, Scan, Take, snapshot
-from services.camera.scan.sightings import Eye
+from services.camera.scan.sightings import Eye, Sought
 from services.camera.scan.streamed import Streamed
 from services.camera.settings import Config
 from services.payloads import OrderState, Place, ScanResult, ScanState
@@ -168,11 +168,12 @@ class Scanner:
 
     def _results(self, scan: Scan) -> None:
         for marker, seen in sorted(scan.seen.items()):
-            size = self.config.markers.of(marker)
-            result = sightings.result(self.eye, marker, seen, size, scan.name, self.picture.mode)
-            self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
-            self._publish(topics.CAMERA_MARKER.message(result, cam=self.config.name, marker=marker))
-            self.remember(result)
+            sought = Sought(marker, self.config.markers.of(marker), self.config.markers.prior(marker))
+            results = sightings.results(self.eye, sought, seen, scan.name, self.picture.mode)
+            for result in results:
+                self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
+            self._publish(topics.CAMERA_MARKER.message(results[0], cam=self.config.name, marker=marker))
+            self.remember(results[0])
 
     def _say(self, state: ScanState) -> None:
         self.bulletin.say(topics.CAMERA_SCAN_STATE, state)
