@@ -49,10 +49,11 @@ class MoveBy:
 
 @dataclass(frozen=True)
 class ScanFor:
-    """Look for these targets at these places; None: the configured ones."""
+    """Look for these targets at these places; None: the configured ones. `full`: every place, in both picture modes."""
 
     targets: tuple[int, ...] | None = None
     places: tuple[str, ...] | None = None
+    full: bool = False
 
 
 @dataclass(frozen=True)
@@ -227,10 +228,10 @@ def _zoom(value: Any) -> Command:
 def _scan(value: Any) -> Command:
     if not isinstance(value, dict):
         return ScanFor() if _flag(value) else EndScan()
-    if unknown := set(value) - {"targets", "places"}:
-        raise ValueError(f"expected targets and places, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
-    targets, places = value.get("targets"), value.get("places")
-    return ScanFor(_markers(targets) if targets else None, _names(places) if places else None)
+    if unknown := set(value) - {"targets", "places", "full"}:
+        raise ValueError(f"expected targets, places and full, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
+    targets, places, full = value.get("targets"), value.get("places"), _flag(value.get("full", "off"))
+    return ScanFor(_markers(targets) if targets else None, _names(places) if places else None, full)
 
 
 def _routine(value: Any) -> Command:

@@ -18,6 +18,7 @@ from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
 from services.camera.capabilities import Abilities
 from services.camera.chores import WITHOUT_CAMERA, Chores
+from services.camera.commands import VideoMode
 from services.camera.device import REPLY, Sender
 from services.camera.discovery import Discovery
 from services.camera.health import IDLE_S, Health
@@ -86,6 +87,7 @@ class CameraService:
         self.trips = Trips(config, self.bulletin, self.places)
         self.motors.skill = self.trips.skill
         self.scanner = Scanner(config, self.trips.skill, eye, analyst, self.bulletin, self.places)
+        self.scanner.begin = self._begin
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
@@ -143,7 +145,7 @@ class CameraService:
         self._watch_motion(now)
         self.bulletin.tick(now, self.counters)
         self.discovery.tick(self.bulletin.identity, self.places.named)
-        self.due = min(time for time in (self.bulletin.due, self.stage.due) if time is not None)
+        self.due = min(time for time in (self.bulletin.due, self.stage.due, self.scanner.due) if time is not None)
         return self._flush()
 
     def _watch_motion(self, now: float) -> None:
@@ -211,6 +213,7 @@ class CameraService:
                 self.stage.begin(self.abilities.meet(self.bulletin.identity, now), now, _nobody)
                 now = (yield from attempt(GetPicture())).received
                 self.upkeep.met()
+                self.stage.begin(self.scanner.restored(), now, _nobody)
                 if self.bulletin.turning:
                     self.motors.make_sure(now)
             met = self.health.online
@@ -252,6 +255,8 @@ class CameraService:
         elif isinstance(command, orders.Motor):
             self.motors.order(job, now)
         else:
+            if isinstance(command, VideoMode):
+                self.scanner.modes.give_over()
             self.answers.tell(job, "running")
             self.stage.begin(self.chores.plan(command, now), now, lambda run, now: self._chore_ended(job, run))
 
