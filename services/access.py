@@ -32,7 +32,7 @@ def acl(cameras: Iterable[str], *, anonymous: bool = False) -> str:
     plays the home, the robot and the operator in turn; an installation has no such clients.
     """
     cameras = list(cameras)
-    lines = ["# Written by `apartment topics --acl` from services/topics.py; a test keeps them equal.", ""]
+    lines = ["# Written by `apartment topics --acl` from services/topics/; a test keeps them equal.", ""]
     if anonymous:
         lines += ["# whoever gives no name", "topic readwrite #", ""]
     for account in accounts(cameras):

@@ -70,6 +70,7 @@ class MountSettings(Section):
     pan_to_tilt_m: Pair = (0.0, 0.0)  # forward, along the pan axis away from the plate
     tilt_to_lens_m: Pair = (0.0, 0.0)  # along the optical axis, up in the picture
     sensor_roll_deg: float = 0.0
+    tilt_zero_deg: float = 0.0  # the tilt reading at which the optical axis is level
 
     def mount(self) -> Mount:
         """The same for the formulas."""

@@ -41,7 +41,8 @@ SQUARE = np.array([[-0.5, 0.5, 0], [0.5, 0.5, 0], [0.5, -0.5, 0], [-0.5, -0.5, 0
 class View:
     """One sighting: `corners` (4, 2) as `detect` gives them, seen through `lens` from `camera` (T_AC).
 
-    `size_m` is the side of the printed black square, `angle_noise_deg` how well the pan and tilt readings are known.
+    `size_m` is the side of the printed black square, `angle_noise_deg` how well the pan and tilt readings are known,
+    `focal_doubt` the standard deviation of the lens's focal length as a share of it.
     """
 
     lens: Lens
@@ -49,6 +50,7 @@ class View:
     corners: Array
     size_m: float
     angle_noise_deg: float = 0.05
+    focal_doubt: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +92,7 @@ class _Sights:
     size: Array  # (g,), m
     noise: Array  # (g,), rad, of a corner
     angle_noise: Array  # (g,), rad, of the camera
+    focal_doubt: Array  # (g,), share
 
 
 def _gather(views: Sequence[View]) -> _Sights:
@@ -110,6 +113,7 @@ def _gather(views: Sequence[View]) -> _Sights:
         size=np.array([v.size_m for v in first], float),
         noise=np.array([n / v.lens.focal for n, v in zip(noise_px, first, strict=True)], float),
         angle_noise=np.radians([v.angle_noise_deg for v in first]),
+        focal_doubt=np.array([v.focal_doubt for v in first], float),
     )
 
 
@@ -247,4 +251,6 @@ def _covariance(sights: _Sights, index: int, place: Array) -> Array:
     along = noise * distance**2 / sights.size[index]
     across = distance * hypot(noise / 2, sights.angle_noise[index])
     ray = np.outer(to_marker, to_marker) / distance**2
-    return np.asarray(along**2 * ray + across**2 * (np.eye(3) - ray), float)
+    axis = sights.rotation[index][:, 2]
+    stretched = sights.focal_doubt[index] * float(axis @ to_marker) * axis  # a longer lens moves the depth alone
+    return np.asarray(along**2 * ray + across**2 * (np.eye(3) - ray) + np.outer(stretched, stretched), float)

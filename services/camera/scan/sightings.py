@@ -17,17 +17,24 @@ from services.vision.detect import Detection
 from services.vision.frames import Array, Kind, Mount, camera_in_apartment, quaternion
 from services.vision.lens import Lens
 from services.vision.pose import Located, View, locate
+from services.vision.zoom import WIDEST, Level, Magnification, at_level
+
+WELL_KNOWN = 0.01  # share of the magnification's uncertainty above which no distance is told: 5 cm at 5 m
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """One marker in one frame: `at` when it was taken, `size` of the picture (width, height)."""
+    """One marker in one frame: `at` when it was taken, `size` of the picture (width, height).
+
+    `magnified`: as it was measured against the widest picture from there (`vision/zoom.py`); None: it was not.
+    """
 
     detection: Detection
     place: str
     reading: Reading
     at: float
     size: tuple[int, int]
+    magnified: Magnification | None = None
 
     @property
     def off_centre(self) -> float:
@@ -56,13 +63,22 @@ def between(one: tuple[float, float], other: tuple[float, float]) -> float:
 
 @dataclass(frozen=True)
 class Eye:
-    """What is known of the camera; `lens` or `mount` None: no positions."""
+    """What is known of the camera; `lens` or `mount` None: no positions. `levels`: its calibrated zoom."""
 
     camera: str
     dictionary: str
     lens: Lens | None
     mount: Mount | None
     widest: float = 0.0  # the zoom at which the lens was calibrated
+    levels: tuple[Level, ...] = ()
+
+    def magnification(self, seen: Sighting) -> Magnification | None:
+        """Of the picture of a sighting: measured, or by the table; None where neither tells it well enough."""
+        if seen.magnified is not None:
+            known: Magnification | None = seen.magnified
+        else:
+            known = WIDEST if seen.reading.zoom <= self.widest else at_level(self.levels, seen.reading.zoom)
+        return known if known is not None and known.relative <= WELL_KNOWN else None
 
 
 def result(eye: Eye, marker: int, seen: Sequence[Sighting], size_m: float, scan: str, mode: str) -> ScanResult:
@@ -88,19 +104,23 @@ def result(eye: Eye, marker: int, seen: Sequence[Sighting], size_m: float, scan:
 def _located(eye: Eye, seen: Sequence[Sighting], size_m: float) -> tuple[Located | None, str | None]:
     if eye.lens is None or eye.mount is None:
         return None, "the camera has no camera_info" if eye.lens is None else "the camera has no mount"
-    plain = [sighting for sighting in seen if sighting.reading.zoom <= eye.widest]
-    if not plain:
-        return None, f"seen only zoomed in: the lens is calibrated at zoom {eye.widest:g}"
+    views = [view for view in (_view(eye.lens, eye.mount, eye, sighting, size_m) for sighting in seen) if view]
+    if not views:
+        return None, f"how much zoom {seen[0].reading.zoom:g} magnifies is not known well enough to tell the distance"
     try:
-        return locate([_view(eye.lens, eye.mount, sighting, size_m) for sighting in plain]), None
+        return locate(views), None
     except ValueError as error:
         return None, str(error)
 
 
-def _view(lens: Lens, mount: Mount, sighting: Sighting, size_m: float) -> View:
+def _view(lens: Lens, mount: Mount, eye: Eye, sighting: Sighting, size_m: float) -> View | None:
+    """None where the magnification is not known."""
+    known = eye.magnification(sighting)
+    if known is None:
+        return None
     pose = camera_in_apartment(mount, sighting.reading.pan, sighting.reading.tilt)
     corners = np.asarray(sighting.detection.corners, float)
-    return View(lens.scaled(*sighting.size), pose, corners, size_m)
+    return View(known.through(lens.scaled(*sighting.size)), pose, corners, size_m, focal_doubt=known.relative)
 
 
 def _geometry(located: Located | None) -> dict[str, object]:
