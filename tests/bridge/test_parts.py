@@ -200,7 +200,7 @@ def test_a_mission_is_ordered_followed_and_cancelled(bridge: Driven) -> None:
     }
     bridge.hears("mission/tiago/state", going)
     bridge.hears("mission/other/state", {**going, "state": "failed"})
-    assert said(bridge, "/iot_mission/state") == [{"key": "go", "value": "Kitchen, seen there"}]
+    assert said(bridge, "/iot_mission/state") == [{"key": "go", "value": "Kitchen, last seen there"}]
     answers, asked = call(bridge, "/iot_mission/cancel")
     assert (answers[0]["success"], asked) == (True, ["mission/tiago/order"])
 
