@@ -24,25 +24,39 @@ from tests.bridge.test_ros import publishers
 RATE = 300.0  # messages a second, each way
 TURN_S = 10.0
 AROUND_S = 1.5  # before an outage what was under way may be lost with it; after it all must be there again
-ARRIVES_S = 2.0
-BACK_S = 2.0
+PATIENCE_S = 60.0
 GROWTH_KB = 30_000
 ITEMS = bench.ITEMS
 
 
 @dataclass
 class Road:
-    """One direction: what was said when, and what arrived."""
+    """One direction: what was said when, and what arrived; numbers that grow."""
 
     said: dict[int, float] = field(default_factory=dict)
     came: set[int] = field(default_factory=set)
+    newest_said: int = 0
+    newest_came: int = 0
+
+    def says(self, number: int, at: float) -> None:
+        self.said[number] = at
+        self.newest_said = number
+
+    def takes(self, number: int) -> None:
+        self.came.add(number)
+        self.newest_came = max(self.newest_came, number)
+
+    def flows(self, what: str) -> None:
+        """Waits until what is said from now on arrives."""
+        mark = self.newest_said
+        wait_until(lambda: self.newest_came > mark, what, PATIENCE_S)
 
     def lost(self, outages: list[tuple[float, float]]) -> list[int]:
         """Numbers that are missing although nothing was out of order; what is older is forgotten."""
-        due = {number: at for number, at in list(self.said.items()) if at < time.monotonic() - ARRIVES_S}
-        missing = [number for number, at in due.items() if number not in self.came
+        due = [(number, at) for number, at in list(self.said.items()) if number <= self.newest_came]
+        missing = [number for number, at in due if number not in self.came
                    and not any(begin - AROUND_S <= at <= end + AROUND_S for begin, end in outages)]  # fmt: skip
-        for number in due:
+        for number, _ in due:
             self.said.pop(number)
             self.came.discard(number)
         return missing
@@ -67,7 +81,7 @@ class Traffic:
         self._client = client = mqtt_client(self.lab.port, "traffic")
         client.reconnect_delay_set(1, 1)
         client.on_connect = lambda *_: client.subscribe("home/+/set", qos=1)
-        client.on_message = lambda _c, _d, message: self.to_mqtt.came.add(int(message.payload))
+        client.on_message = lambda _c, _d, message: self.to_mqtt.takes(int(message.payload))
         client.subscribe("home/+/set", qos=1)
         client.loop_start()
         threads = [threading.Thread(target=self._say), threading.Thread(target=self._hear, args=(ears,))]
@@ -87,7 +101,7 @@ class Traffic:
         while not self.ending.wait(0.05):
             while number < (time.monotonic() - began) * RATE:
                 if self._client.is_connected():
-                    self.to_ros.said[number] = time.monotonic()
+                    self.to_ros.says(number, time.monotonic())
                     self._client.publish(f"home/{ITEMS[number % len(ITEMS)]}/state", str(number), qos=1, retain=True)
                 number += 1
 
@@ -95,8 +109,10 @@ class Traffic:
         assert ears.process.stdout
         for line in ears.process.stdout:
             told = json.loads(line)
-            self.to_mqtt.said.update(dict(told["said"]))
-            self.to_ros.came.update(int(value) for _, value in told["heard"])
+            for number, at in told["said"]:
+                self.to_mqtt.says(number, at)
+            for _, value in told["heard"]:
+                self.to_ros.takes(int(value))
             self.last.update(told["heard"])
 
     def turn(self, rng: random.Random) -> float:
@@ -104,8 +120,9 @@ class Traffic:
         began = time.monotonic()
         self.ending.wait(rng.uniform(1.0, 3.0))
         seconds = rng.choice((self.lose_broker, self.lose_master))()
-        self.ending.wait(max(ARRIVES_S + AROUND_S, TURN_S - (time.monotonic() - began)))
+        self.ending.wait(max(1.0, TURN_S - (time.monotonic() - began)))
         for name, road in (("to ROS", self.to_ros), ("to MQTT", self.to_mqtt)):
+            road.flows(f"what is said {name}")
             lost = road.lost(self.outages)
             assert not lost, f"{len(lost)} lost {name}, such as {lost[:3]}"
         self._weigh()
@@ -117,9 +134,8 @@ class Traffic:
         self.lab.restart_broker()
         back = time.monotonic()
         self.ending.wait(0.5)  # what was said before is told a few times a second only
-        marks = max(self.to_ros.said, default=0), max(self.to_mqtt.said, default=0)
-        wait_until(lambda: max(self.to_ros.came, default=0) > marks[0], "states on ROS again", 30.0)
-        wait_until(lambda: max(self.to_mqtt.came, default=0) > marks[1], "a robot's word on MQTT again", 30.0)
+        self.to_ros.flows("states on ROS again")
+        self.to_mqtt.flows("a robot's word on MQTT again")
         self.outages.append((gone, time.monotonic()))
         return time.monotonic() - back
 
