@@ -22,6 +22,7 @@ from rich.table import Table
 from services.simulated import Simulated, parts_of, services_of
 from services.virtual import VirtualApartment
 from tests import trials
+from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
 from tests.small_flat import SmallFlat, small_flat
 from tests.vision import positions
@@ -79,6 +80,13 @@ def scan(flat: VirtualApartment, rng: random.Random) -> float:
     return flat.now - began
 
 
+@contextmanager
+def bridge() -> Iterator[Turn]:
+    """Turns of a bridge under traffic both ways, one for all."""
+    with bridge_trials.under_traffic() as traffic:
+        yield traffic.turn
+
+
 PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "kills": (lambda: real(lambda flat, rng: trials.kill(flat, rng.choice(trials.BUS_SERVICES))), 40, "s until online"),
     "camera": (lambda: real(lambda flat, rng: trials.kill_camera(flat)), 10, "s until an order is done"),
@@ -114,6 +122,7 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
         25,
         "s until it shows",
     ),
+    "bridge": (bridge, 30, "s until all flows again"),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
