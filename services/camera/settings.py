@@ -19,10 +19,11 @@ LOW = {"diagnostics": False, "alarm": False, "frames": 1}  # for a small compute
 
 
 class MarkerSizes(Section):
-    """Side of the black square in metres: of every marker, and of those that differ, by id."""
+    """Side of the black square in metres: of every marker, and of those that differ, by id; and where some are."""
 
     size: float = Field(default=0.14, gt=0.005, lt=2)
     sizes: dict[int, float] = {}
+    known: dict[int, tuple[float, float, float]] = {}  # centres that somebody measured (m, apartment), for the mount
 
     def of(self, marker: int) -> float:
         """The side of that marker, metres."""

@@ -13,6 +13,7 @@ from services.aside import Aside
 from services.bus.memory import Hub, MemoryBus
 from services.camera.address import Address
 from services.camera.brands.amcrest import Amcrest
+from services.camera.calibration.study import Studio
 from services.camera.program import eye
 from services.camera.scan.analysis import Inline
 from services.camera.service import CameraService
@@ -41,6 +42,7 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         self.client = Client(MemoryBus(self.hub))
         self.client.subscribe("#")
         self.links: list[Link] = []
+        self.behind: dict[str, Inside] = {}  # the inside of each camera
         self._stack = ExitStack()
         instances = self.apartment.instances.values()
         self.runners = [self._runner(one) for one in instances if one.row.on_bus]
@@ -120,11 +122,12 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         """The service as it is, on a wire to the simulated camera of this configuration."""
         simulator = self.apartment.instances["simulated-camera"].config
         assert isinstance(simulator, CameraSimulator)
-        behind = inside(simulator, self.now)
+        behind = self.behind[config.name] = inside(simulator, self.now)
         gate = Gate(clock=self.clock, pause=lambda seconds: None)
         link = Link(*(self._lane(behind, config.address, post, gate) for _ in range(2)))
         self.links.append(link)
-        return CameraService(config, link, lambda: Inline(post), eye(config))
+        sender = Studio(link, post, self.clock, at_once=True)
+        return CameraService(config, sender, lambda: Inline(post), eye(config))
 
     def _lane(self, behind: Inside, address: Address, post: Post, gate: Gate) -> Lane:
         wire = Wire(behind)
