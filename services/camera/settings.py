@@ -20,12 +20,13 @@ LOW = {"diagnostics": False, "alarm": False, "frames": 1}  # for a small compute
 
 
 class MarkerSizes(Section):
-    """Side of the black square in metres, and how it faces: of every marker, and of those that differ, by id."""
+    """Side of the black square in metres, how it faces, and where some are: of every marker, and by id."""
 
     size: float = Field(default=0.14, gt=0.005, lt=2)
     sizes: dict[int, float] = {}
     faces: Faces | None = None  # "up": lies flat; "wall": hangs upright; None: anyhow
     facing: dict[int, Faces | None] = {}
+    known: dict[int, tuple[float, float, float]] = {}  # centres that somebody measured (m, apartment), for the mount
 
     def of(self, marker: int) -> float:
         """The side of that marker, metres."""
