@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from services import access, client, process, secret_store, topics
+from services import access, client, openhab_commands, process, secret_store, topics
 from services.bus import Message
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
@@ -197,6 +197,7 @@ def probe(
 
 calibrate = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
 app.add_typer(calibrate, name="calibrate")
+app.add_typer(openhab_commands.app, name="openhab")
 
 
 @calibrate.command(epilog="Example: apartment calibrate ptz ip1 --yes-move")

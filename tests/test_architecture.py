@@ -54,6 +54,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage"),
     "services.openhab": SERVICE,
+    "services.openhab_commands": ("services",),
     "services.mission": SERVICE,
     "services.dashboard": SERVICE,
     "services.simulators": (*SERVICE, "services.vision"),
@@ -95,7 +96,8 @@ DOORS: dict[str, tuple[str, ...]] = {
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
     "yaml": ("services.document",),
-    "typer": ("services.__main__",),
+    "typer": ("services.__main__", "services.openhab_commands"),
+    "lark": ("services.openhab.check.",),
     "rich": ("services.__main__", "services.camera.ptz.command", "services.demo", "services.camera.probe."),
     "starlette": ("services.dashboard.http",),
     "uvicorn": ("services.dashboard.http",),
@@ -121,6 +123,15 @@ MOVING = (
     "turning",
     "zooming",
 )
+OPENHAB_PURE = tuple(
+    f"services.openhab.{part}"
+    for part in (
+        "check.", "versions", "words", "lines", "semantics", "skill", "alexa", "site", "cameras", "state_description",
+        "readback",
+        "items", "mqtt", "things", "sitemap", "persist", "reactions", "dsl", "javascript", "widgets", "generate",
+        "importing",
+    )
+)  # fmt: skip
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
     "services.bus", "services.vision.", *(f"services.camera.ptz.{part}" for part in MOVING),
@@ -130,7 +141,7 @@ PURE = (
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
     "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules",
-    "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
+    "services.persistence.rows", "services.persistence.strategies", *OPENHAB_PURE,
     "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",
     "services.simulators.devices", "services.simulators.life",
 )  # fmt: skip
