@@ -8,7 +8,6 @@ from __future__ import annotations
 import logging
 import signal
 import sys
-from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,11 +15,12 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from services import access, client, openhab_commands, process, secret_store, topics
+from services import access, client, process, secret_store, stored, topics
 from services.bus import Message
+from services.command_line import mission, openhab
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
-from services.payloads import OrderResult, stamp
+from services.payloads import OrderResult
 from services.supervisor import Supervisor, commands, processes
 from services.topics import page
 
@@ -147,27 +147,6 @@ def scan(
         raise typer.Exit(1)
 
 
-@app.command(epilog="Example: apartment history Kitchen_Light --limit 5")
-def history(item: str, limit: int = 20, config: Config = CONFIG, json: Json = False) -> None:
-    """Show the newest stored states of an item, oldest first; exit 1 when there are none."""
-    from services import persistence, storage  # the database's libraries, for this command alone
-
-    settings = load(config, ("persistence",)).instances["persistence"].config
-    assert isinstance(settings, persistence.Config)
-    with closing(storage.open_storage(settings.address)) as opened:
-        rows = [
-            (stamp(one.time / 1e6), one.num if one.text is None else one.text)
-            for one in opened.samples(item, limit=limit)
-        ]
-    if json:
-        out.print_json(data={"item": item, "samples": rows})
-    else:
-        for time, value in rows:
-            _say(f"{time}  {value}")
-    if not rows:
-        raise typer.Exit(1)
-
-
 @app.command(epilog="Example: apartment probe ip1 --url http://192.0.2.9 --user ros")
 def probe(
     camera: Annotated[str, typer.Argument(help="A camera of the configuration, or with --url a name for a new one.")],
@@ -195,9 +174,11 @@ def probe(
     command.run(out, target, out_folder or Path(f"probe-{camera}"), yes_move=yes_move, json_only=json)
 
 
+stored.add_to(app)
+app.add_typer(mission.app, name="mission")
+app.add_typer(openhab.app, name="openhab")
 calibrate = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
 app.add_typer(calibrate, name="calibrate")
-app.add_typer(openhab_commands.app, name="openhab")
 
 
 @calibrate.command(epilog="Example: apartment calibrate ptz ip1 --yes-move")
@@ -268,6 +249,10 @@ def _ended(result: OrderResult, json: bool) -> None:
 
 def main() -> None:
     """Runs the command line; every error of ours becomes a line and an exit code, never a traceback."""
+    if any(":=" in one for one in sys.argv):
+        from services.bridge import arguments  # roslaunch starts us
+
+        sys.argv[1:] = arguments.take(sys.argv[1:])
     try:
         app(standalone_mode=True)
     except ConfigError as error:

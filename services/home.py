@@ -197,6 +197,19 @@ class Home(Section):
         """The members of group ROS."""
         return {name: item for name, item in self.items.items() if item.ros}
 
+    def named(self, words: str) -> list[str] | None:
+        """The items that `Name`, `Group*` (its members) or `*` (all) means; None when the home has no such one."""
+        if words == "*":
+            return list(self.items)
+        if not words.endswith("*"):
+            return [words] if words in self.items else None
+        group = words[:-1]
+        if group == GROUP_ROS:
+            return list(self.ros_items)
+        if group not in self.groups:
+            return None
+        return [name for name, item in self.items.items() if group in item.groups]
+
     def room_of(self, name: str) -> str | None:
         """The room of an item: its own, else its thing's."""
         item = self.items[name]

@@ -34,6 +34,7 @@ LEVELS = {
     "service": r"[a-z0-9_-]+",
     "key": r"[A-Za-z]+",
     "marker": r"[0-9]{1,4}",
+    "id": r"[A-Za-z0-9_-]{1,64}",
     "platform": r"[a-z_]+",
     "entity": r"[a-z0-9_-]+",
     "component": r"[A-Za-z0-9_-]+(?:/[A-Za-z0-9_-]+)*",

@@ -24,6 +24,7 @@ from services.virtual import VirtualApartment
 from tests import trials
 from tests.camera import trials as camera_trials
 from tests.small_flat import SmallFlat, small_flat
+from tests.vision import positions
 
 LONGEST_S = 600.0
 HANGING = ("a", "b", "c", "d")
@@ -115,6 +116,7 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     ),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
+    "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 
 

@@ -12,7 +12,7 @@ import re
 import shutil
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -25,10 +25,19 @@ BUS_SERVICES = ("camera-ip1", "bridge", "persistence", "simulated-home")
 
 
 @contextmanager
-def virtual_flat(folder: Path) -> Iterator[VirtualApartment]:
-    """The simulated apartment in virtual time, on a copy of its configuration and a database of its own."""
+def virtual_flat(folder: Path, changes: Mapping[str, str] | None = None) -> Iterator[VirtualApartment]:
+    """The simulated apartment in virtual time, on a copy of its configuration and a database of its own.
+
+    `changes` of the configuration's text.
+    """
     config = Path(shutil.copytree(CONFIG, folder / "config")) / "simulated.yaml"
-    own = {"APARTMENT_DATABASE": f"sqlite:///{folder}/bus.db", "APARTMENT_WITHOUT_ROS": "true"}
+    for old, new in (changes or {}).items():
+        config.write_text(config.read_text().replace(old, new))
+    own = {
+        "APARTMENT_DATABASE": f"sqlite:///{folder}/bus.db",
+        "APARTMENT_STATE": str(folder / "state"),
+        "APARTMENT_WITHOUT_ROS": "true",
+    }
     with VirtualApartment(config, own) as flat:
         yield flat
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack, closing, contextmanager
 from services import document
 from services.camera.address import Address
 from services.camera.alarm.listener import Listener
+from services.camera.calibration import levels
 from services.camera.device import Device
 from services.camera.places import Places
 from services.camera.scan.analysis import Pool
@@ -71,4 +72,6 @@ def eye(config: Config) -> Eye:
         except (ValueError, AttributeError) as error:
             raise ConfigError([f"{file}:1: {error}"]) from error
     mount = config.mount.mount() if config.mount else None
-    return Eye(config.name, config.dictionary, lens, mount, config.zoom_range[0])
+    zoom = levels.read(levels.of_lens(config.folder / config.camera_info)) if config.camera_info is not None else ()
+    noise = config.reading_noise_deg
+    return Eye(config.name, config.dictionary, lens, mount, config.zoom_range[0], zoom, angle_noise_deg=noise)

@@ -36,7 +36,7 @@ from services.camera.upkeep import Upkeep
 from services.camera.video.channel import ASKED, Channel
 from services.camera.video.feed import Feed
 from services.errors import BadMessage
-from services.payloads import Order, OrderState, PositionSet
+from services.payloads import Order, OrderState, PositionSet, ScanResult
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
 STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
@@ -65,6 +65,7 @@ class CameraService:
                 topics.CAMERA_ORDER,
                 topics.CAMERA_POSITION_SET,
                 topics.CAMERA_SNAPSHOT_GET,
+                topics.CAMERA_MARKER,
                 topics.HOMEASSISTANT_ENTITY,
                 topics.HOMEASSISTANT_STATUS,
             )
@@ -220,6 +221,8 @@ class CameraService:
             self.stage.begin(self.feed.published(), now, _nobody)
         elif read.topic in (topics.HOMEASSISTANT_ENTITY, topics.HOMEASSISTANT_STATUS):
             self.discovery.hear(read)
+        elif isinstance(payload, ScanResult):
+            self.scanner.remember(payload)  # also of another life of this service
         elif isinstance(payload, PositionSet):
             value = payload.model_dump(exclude={"id", "by"}, exclude_none=True)
             job = life.job("Position", value, payload.by, payload.id, read.message)

@@ -13,20 +13,28 @@ from services.camera.ptz.goal import Limits
 from services.camera.video.settings import SnapshotSettings, StreamSettings
 from services.section import Section
 from services.vision.frames import Mount
+from services.vision.prior import Faces, Prior
 
 Pair = tuple[float, float]
 LOW = {"diagnostics": False, "alarm": False, "frames": 1}  # for a small computer, as the report ran its Raspberry Pi
 
 
 class MarkerSizes(Section):
-    """Side of the black square in metres: of every marker, and of those that differ, by id."""
+    """Side of the black square in metres, and how it faces: of every marker, and of those that differ, by id."""
 
     size: float = Field(default=0.14, gt=0.005, lt=2)
     sizes: dict[int, float] = {}
+    faces: Faces | None = None  # "up": lies flat; "wall": hangs upright; None: anyhow
+    facing: dict[int, Faces | None] = {}
 
     def of(self, marker: int) -> float:
         """The side of that marker, metres."""
         return self.sizes.get(marker, self.size)
+
+    def prior(self, marker: int) -> Prior | None:
+        """What is known of how that marker is turned."""
+        faces = self.facing.get(marker, self.faces)
+        return Prior(faces) if faces else None
 
 
 class PictureOptions(Section):
@@ -70,6 +78,7 @@ class MountSettings(Section):
     pan_to_tilt_m: Pair = (0.0, 0.0)  # forward, along the pan axis away from the plate
     tilt_to_lens_m: Pair = (0.0, 0.0)  # along the optical axis, up in the picture
     sensor_roll_deg: float = 0.0
+    tilt_zero_deg: float = 0.0  # the tilt reading at which the optical axis is level
 
     def mount(self) -> Mount:
         """The same for the formulas."""
@@ -106,6 +115,7 @@ class Config(Section):
     tilt_range: Pair = (-10.0, 108.0)
     zoom_range: Pair = (0.0, 8.0)
     mount: MountSettings | None = None
+    reading_noise_deg: float = Field(default=0.05, ge=0, le=2)  # of pan and tilt, one standard deviation
     routine: tuple[str, ...] | None = None  # places that a scan visits, in order; None: all, on the shortest way
     frames: int = Field(default=4, ge=1, le=50)  # at each place of a scan
     settle_s: float = Field(default=0.6, ge=0, le=10)  # from rest to the first frame: the picture's own delay

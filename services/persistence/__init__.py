@@ -4,6 +4,6 @@ Listens to every topic that `topics/` marks as stored. Says `home/<item>/state`,
 state it restores at the start because the broker has none. Reading is the history service's.
 """
 
-from services.persistence.service import Config, start
+from services.persistence.service import Config, check, start
 
-__all__ = ["Config", "start"]
+__all__ = ["Config", "check", "start"]

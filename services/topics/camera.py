@@ -81,7 +81,7 @@ CAMERA_MARKER = Topic(
     Kind.STATE,
     p.ScanResult,
     ("camera-<cam>",),
-    (*SHOWN, "openhab"),
+    (*SHOWN, "openhab", "camera-<cam>"),
     "the newest scan result of that marker",
 )
 CAMERA_SCAN_IMAGE = Topic(

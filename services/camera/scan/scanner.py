@@ -5,7 +5,7 @@ The scan itself is `search.py`; looking `analysis.py`; from sightings to places 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Literal
 from uuid import uuid4
 
@@ -19,11 +19,12 @@ from services.camera.ptz.skill import Skill
 from services.camera.requests import GetPicture, Picture, Refused
 from services.camera.scan import sightings
 from services.camera.scan.analysis import Analysed, Analyst, Task
-from services.camera.scan.search import Frame, Scan, Take, shortest, snapshot
-from services.camera.scan.sightings import Eye
+from services.camera.scan.route import shortest
+from services.camera.scan.search import Frame, Scan, Take, snapshot
+from services.camera.scan.sightings import Eye, Sought
 from services.camera.scan.streamed import Streamed
 from services.camera.settings import Config
-from services.payloads import OrderState, Place, ScanState
+from services.payloads import OrderState, Place, ScanResult, ScanState
 
 STATE_S = 0.5  # between two states of a scan that runs
 
@@ -44,6 +45,7 @@ class Scanner:
         self.routine = config.routine
         self.show = False
         self.picture = Picture(config.picture.flip, config.picture.mirror, "color")
+        self.seen_at: dict[int, str] = {}  # by marker, the place that showed it best
         self.frames = 0
         self.scan: Scan | None = None
         self._looking: Analyst | None = None
@@ -149,18 +151,29 @@ class Scanner:
         """The places to visit in their order; Refused when there are none, or one is not known."""
         names = order.places or self.routine
         if names is None:
-            named = self.places.named
-            names = tuple(shortest(named, self.config.limits, self.bulletin.reading))
+            names = self._shortest(order.targets or self.targets)
         if not names:
             raise Refused("no places to visit: save some with SaveAs")
         return {self.places.find(name): self.places.get(name) for name in names}
 
+    def _shortest(self, targets: Iterable[int]) -> tuple[str, ...]:
+        """All places, first the one where a target was seen last."""
+        named = self.places.named
+        first = next((self.seen_at[one] for one in targets if self.seen_at.get(one) in named), None)
+        return tuple(shortest(named, self.config.limits, self.bulletin.reading, self.skill, first=first))
+
+    def remember(self, result: ScanResult) -> None:
+        """A result, also of another life of this service: where that marker was seen last."""
+        self.seen_at[result.marker] = result.place
+
     def _results(self, scan: Scan) -> None:
         for marker, seen in sorted(scan.seen.items()):
-            size = self.config.markers.of(marker)
-            result = sightings.result(self.eye, marker, seen, size, scan.name, self.picture.mode)
-            self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
-            self._publish(topics.CAMERA_MARKER.message(result, cam=self.config.name, marker=marker))
+            sought = Sought(marker, self.config.markers.of(marker), self.config.markers.prior(marker))
+            results = sightings.results(self.eye, sought, seen, scan.name, self.picture.mode)
+            for result in results:
+                self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
+            self._publish(topics.CAMERA_MARKER.message(results[0], cam=self.config.name, marker=marker))
+            self.remember(results[0])
 
     def _say(self, state: ScanState) -> None:
         self.bulletin.say(topics.CAMERA_SCAN_STATE, state)

@@ -6,9 +6,8 @@ magnification is not known. Not here: finding markers (`analysis.py`), where the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise, permutations
 from typing import Literal, cast
 
 from services.camera.plan import Plan, ask, attempt, wait
@@ -26,8 +25,6 @@ ANALYSE_S = 30.0  # longest wait for the last frames to be looked at
 WELL = 2  # frames that must show a target before a scan may end early
 NEARER_DEG = 3.0  # a place that looks less nearer than this is not worth the way
 TRIES = 3  # of a picture: the camera sometimes closes without an answer
-PERMUTED = 7  # up to this many places the shortest order is found by trying all
-TILT_COST = 1.7  # tilt turns slower than pan: a degree of it counts as so many
 
 
 @dataclass(frozen=True)
@@ -160,34 +157,3 @@ class Scan:
                 raise Away("the frames were not looked at in time")
             now = yield from wait(now + 0.05)
         return now
-
-
-def shortest(places: Mapping[str, Place], limits: Limits, reading: Reading | None) -> list[str]:
-    """The names in the order of the shortest open tour from where the camera looks (both axes turn at once).
-
-    All orders are tried for a few places; for more, the nearest comes next and the tour is improved by reversals.
-    """
-    poses = {name: limits.pose(Reading(place.pan, place.tilt, place.zoom)) for name, place in places.items()}
-    here = limits.pose(reading) if reading else None
-
-    def cost(order: Iterable[str]) -> float:
-        way = ([here] if here else []) + [poses[name] for name in order]
-        hops = pairwise(way)
-        return sum(max(abs(a[0] - b[0]), TILT_COST * abs(a[1] - b[1])) for a, b in hops)
-
-    if len(poses) <= PERMUTED:
-        return list(min(permutations(poses), key=cost, default=()))
-    return _improved(sorted(poses, key=lambda name: poses[name]), cost)
-
-
-def _improved(order: list[str], cost: Callable[[Iterable[str]], float]) -> list[str]:
-    """Reverses stretches of the tour while that makes it shorter (2-opt; Croes 1958)."""
-    better = True
-    while better:
-        better = False
-        for start in range(len(order)):
-            for end in range(start + 2, len(order) + 1):
-                other = order[:start] + order[start:end][::-1] + order[end:]
-                if cost(other) < cost(order) - 1e-9:
-                    order, better = other, True
-    return order

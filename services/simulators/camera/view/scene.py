@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from services.simulators.camera.view import prints
+from services.simulators.board import HeldBoard
+from services.simulators.camera.view import boards, prints
 from services.simulators.camera.view.looks import DENSITY
 from services.simulators.camera.view.optics import Float32, Window, rays
 from services.simulators.camera.view.order import Indexes, Order
@@ -79,6 +80,14 @@ class Scene:
         self.order = Order(self.boxes)
         self._surfaces: dict[tuple[int, int], Surface] = {}
         self._bends: dict[Window, Bend] = {}
+        self.boards = dict(world.boards)
+        self.changes = 0  # of the boards
+
+    def hold(self, name: str, board: HeldBoard | None) -> None:
+        """Somebody holds a board there from now on, or (None) puts it away."""
+        self.boards.pop(name, None)
+        self.boards.update({} if board is None else {name: board})
+        self.changes += 1
 
     def draw(self, pose: Transform, window: Window) -> Image:
         """The upright picture (BGR) from `T_AC` of what the window of the sensor shows."""
@@ -91,6 +100,8 @@ class Scene:
         view = View(pose, self.lens, window, how.rays)
         for marker in self.world.markers:
             prints.draw(image, marker, view, self.boxes)
+        for board in self.boards.values():
+            boards.draw(image, board, view, self.boxes)
         return cv2.GaussianBlur(image, (3, 3), 0.5)  # type: ignore[return-value]
 
     def _draw_all(self, flat: Pinhole, pose: Transform) -> None:
