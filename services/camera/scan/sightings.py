@@ -14,7 +14,7 @@ import numpy as np
 from services.camera.requests import Reading
 from services.payloads import Point, Quaternion, ScanResult, WeightedQuaternion, stamp
 from services.vision.detect import Detection
-from services.vision.frames import Array, Kind, Mount, camera_in_apartment, quaternion
+from services.vision.frames import Array, Kind, Mount, axes_in_apartment, camera_in_apartment, quaternion
 from services.vision.lens import Lens
 from services.vision.pose import Located, View, locate_each
 from services.vision.prior import Prior
@@ -154,13 +154,16 @@ def _hung(located: Located, mount: Mount, doubt_m: float, doubt_deg: float) -> L
 
 
 def _view(eye: Eye, lens: Lens, mount: Mount, sought: Sought, sighting: Sighting, magnified: Magnification) -> View:
+    reading = sighting.reading
     return View(
         lens=magnified.through(lens.scaled(*sighting.size)),
-        camera=camera_in_apartment(mount, sighting.reading.pan, sighting.reading.tilt),
+        camera=camera_in_apartment(mount, reading.pan, reading.tilt),
         corners=np.asarray(sighting.detection.corners, float),
         size_m=sought.size_m,
         angle_noise_deg=eye.angle_noise_deg,
         focal_doubt=magnified.relative,
+        enlarged=max(1.0, magnified.times),
+        axes=axes_in_apartment(mount, reading.pan, reading.tilt),
         at=sighting.at,
     )
 
