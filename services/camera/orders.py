@@ -15,6 +15,7 @@ from services.camera.requests import Direction, Refused, SetPicture
 from services.payloads import Who
 
 RANKS: dict[Who, int] = {"scan": 0, "mission": 1, "human": 2}
+MOST_FRAMES = 50  # at each place of a scan
 LONGEST_S = 30.0  # of one Move order: it can be prolonged
 DIRECTIONS = {
     direction.name.replace("_", "").lower(): direction for direction in Direction if not direction.name.startswith("Z")
@@ -49,11 +50,15 @@ class MoveBy:
 
 @dataclass(frozen=True)
 class ScanFor:
-    """Look for these targets at these places; None: the configured ones. `full`: every place, in both picture modes."""
+    """Look for these targets at these places, so many frames at each; None: as configured.
+
+    `full`: every place, in both picture modes.
+    """
 
     targets: tuple[int, ...] | None = None
     places: tuple[str, ...] | None = None
     full: bool = False
+    frames: int | None = None
 
 
 @dataclass(frozen=True)
@@ -228,10 +233,13 @@ def _zoom(value: Any) -> Command:
 def _scan(value: Any) -> Command:
     if not isinstance(value, dict):
         return ScanFor() if _flag(value) else EndScan()
-    if unknown := set(value) - {"targets", "places", "full"}:
-        raise ValueError(f"expected targets, places and full, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
-    targets, places, full = value.get("targets"), value.get("places"), _flag(value.get("full", "off"))
-    return ScanFor(_markers(targets) if targets else None, _names(places) if places else None, full)
+    if unknown := set(value) - {"targets", "places", "full", "frames"}:
+        raise ValueError(f"expected targets, places, full, frames, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
+    targets, places, frames = (value.get(key) for key in ("targets", "places", "frames"))
+    if frames is not None and not (isinstance(frames, int) and 1 <= frames <= MOST_FRAMES):
+        raise ValueError(f"expected 1 to {MOST_FRAMES} frames, got {str(frames)[:80]!r}")
+    full = _flag(value.get("full", "off"))
+    return ScanFor(_markers(targets) if targets else None, _names(places) if places else None, full, frames)
 
 
 def _routine(value: Any) -> Command:

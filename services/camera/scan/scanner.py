@@ -83,7 +83,7 @@ class Scanner:
         routine, targets = self._visits(order), order.targets or self.targets
         self.scan = Scan(
             name=uuid4().hex[:12],
-            findings=Findings(targets, self.config.frames, self.kind),
+            findings=Findings(targets, order.frames or self.config.frames, self.kind),
             routine=routine,
             limits=self.config.limits,
             skill=self.skill,
