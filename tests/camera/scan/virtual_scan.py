@@ -148,9 +148,12 @@ class Seer:
 
 @contextmanager
 def virtual_scan(
-    folder: Path, *, world: Callable[[dict[str, Any]], None] = lambda world: None, **camera: Any
+    folder: Path, *, world: Callable[[dict[str, Any]], None] = lambda world: None, note: str = "", **camera: Any
 ) -> Iterator[VirtualScan]:
-    """The simulated apartment with K = 8; `world` may change what stands in it, `camera` the camera's section."""
+    """The simulated apartment with K = 8; `world` may change what stands in it, `camera` the camera's section.
+
+    `note`: what a service left behind that was killed while the picture was changed; the camera is as it left it.
+    """
     config = Path(shutil.copytree(CONFIG, folder / "config"))
     apartment = yaml.safe_load((config / "simulated.yaml").read_text())
     apartment["cameras"]["ip1"] |= {"frames": FRAMES, **camera}
@@ -159,7 +162,15 @@ def virtual_scan(
     changed = yaml.safe_load((config / "world.yaml").read_text())
     world(changed)
     (config / "world.yaml").write_text(yaml.safe_dump(changed))
-    with VirtualApartment(config / "simulated.yaml", {"APARTMENT_STATE": str(folder / "state")}) as flat:
+    if note:
+        (folder / "state" / "cameras").mkdir(parents=True)
+        (folder / "state" / "cameras" / "ip1-picture.json").write_text(note, encoding="utf-8")
+    apart = VirtualApartment(config / "simulated.yaml", {"APARTMENT_STATE": str(folder / "state")})
+    if note:
+        modes = [f"VideoInOptions[0].{part}DayNightColor" for part in ("", "NightOptions.", "NormalOptions.")]
+        contrasts = [f"VideoColor[0][{profile}].Contrast" for profile in range(3)]
+        apart.insides["ip1"].device.tables.write([(mode, "2") for mode in modes] + [(one, "80") for one in contrasts])
+    with apart as flat:
         service = next(one.service for one in flat.runners if isinstance(one.service, CameraService))
         inside = flat.insides["ip1"]
         video = "Encode[0].MainFormat[0].Video."
