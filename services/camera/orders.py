@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, TakeLens
 from services.camera.commands import HideLens, PlaySound, RecordSound, VideoMode
 from services.camera.places import name_of
 from services.camera.requests import Direction, Refused, SetPicture
@@ -132,8 +133,9 @@ class Calibrate:
     """Learn the motors: turn with every speed."""
 
 
-Motor = GotoPlace | LookAt | MoveBy | ScanFor | Calibrate
-Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Broadcast | Restart  # all but its motors
+Calibration = Calibrate | CalibrateLens | CalibrateMount
+Motor = GotoPlace | LookAt | MoveBy | ScanFor | Calibration
+Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Broadcast | Restart | TakeLens  # all but its motors
 Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Itself
 
 
@@ -280,6 +282,9 @@ READERS: dict[str, Callable[[Any], Command]] = {
     "AudioPlay": lambda value: PlaySound.read(_text(value)),
     "Reboot": _restart,
     "CalibratePtz": _calibrate,
+    "CalibrateLens": CalibrateLens.read,
+    "CalibrateMount": CalibrateMount.read,
+    "SetCameraInfo": TakeLens.read,
 }
 KEYS = {name.lower(): (name, reader) for name, reader in READERS.items()}
 

@@ -16,6 +16,7 @@ from services.camera.alarm.listener import HEARD, Heard
 from services.camera.alarm.motion import MotionWatch
 from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
+from services.camera.calibration.calibrator import Calibrator
 from services.camera.capabilities import Abilities
 from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.commands import VideoMode
@@ -88,10 +89,11 @@ class CameraService:
         self.motors.skill = self.trips.skill
         self.scanner = Scanner(config, self.trips.skill, eye, analyst, self.bulletin, self.places)
         self.scanner.begin = self._begin
+        self.calibrator = Calibrator(config, self.trips, self.scanner, publish)
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
-        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes)
+        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes, self.calibrator)
         self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=hears)
         self.upkeep = Upkeep(config.name, config.clock, self.bulletin.facts, self._has_time)
         self.abilities = Abilities(config.state and config.state / f"{config.name}-can.json", self._has_time)
@@ -283,8 +285,8 @@ class CameraService:
     def _motor_plan(self, command: Command, now: float) -> Plan[object]:
         if isinstance(command, ScanFor):
             return self.scanner.plan(command, now)
-        if isinstance(command, orders.Calibrate):
-            return self.trips.calibrate()
+        if isinstance(command, orders.Calibration):
+            return self.calibrator.plan(command, now)
         assert isinstance(command, GotoPlace | LookAt)
         return self.trips.plan(command, now)
 

@@ -13,20 +13,29 @@ from services.camera.ptz.goal import Limits
 from services.camera.video.settings import SnapshotSettings, StreamSettings
 from services.section import Section
 from services.vision.frames import Mount
+from services.vision.prior import Faces, Prior
 
 Pair = tuple[float, float]
 LOW = {"diagnostics": False, "alarm": False, "frames": 1}  # for a small computer, as the report ran its Raspberry Pi
 
 
 class MarkerSizes(Section):
-    """Side of the black square in metres: of every marker, and of those that differ, by id."""
+    """Side of the black square in metres, how it faces, and where some are: of every marker, and by id."""
 
     size: float = Field(default=0.14, gt=0.005, lt=2)
     sizes: dict[int, float] = {}
+    faces: Faces | None = None  # "up": lies flat; "wall": hangs upright; None: anyhow
+    facing: dict[int, Faces | None] = {}
+    known: dict[int, tuple[float, float, float]] = {}  # centres that somebody measured (m, apartment), for the mount
 
     def of(self, marker: int) -> float:
         """The side of that marker, metres."""
         return self.sizes.get(marker, self.size)
+
+    def prior(self, marker: int) -> Prior | None:
+        """What is known of how that marker is turned."""
+        faces = self.facing.get(marker, self.faces)
+        return Prior(faces) if faces else None
 
 
 class PictureOptions(Section):
@@ -107,6 +116,7 @@ class Config(Section):
     tilt_range: Pair = (-10.0, 108.0)
     zoom_range: Pair = (0.0, 8.0)
     mount: MountSettings | None = None
+    reading_noise_deg: float = Field(default=0.05, ge=0, le=2)  # of pan and tilt, one standard deviation
     routine: tuple[str, ...] | None = None  # places that a scan visits, in order; None: all, on the shortest way
     frames: int = Field(default=4, ge=1, le=50)  # at each place of a scan
     settle_s: float | None = Field(

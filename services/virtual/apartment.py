@@ -13,6 +13,7 @@ from services.aside import Aside
 from services.bus.memory import Hub, MemoryBus
 from services.camera.address import Address
 from services.camera.brands.amcrest import Amcrest
+from services.camera.calibration.study import Studio
 from services.camera.program import eye
 from services.camera.scan.analysis import Inline
 from services.camera.service import CameraService
@@ -136,7 +137,8 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         gate = Gate(clock=self.clock, pause=lambda seconds: None)
         link = Link(*(self._lane(behind, config.address, post, gate) for _ in range(2)))
         self.links.append(link)
-        service = CameraService(config, link, lambda: Inline(post), eye(config))
+        sender = Studio(link, post, self.clock, at_once=True)
+        service = CameraService(config, sender, lambda: Inline(post), eye(config))
         self.insides[config.name] = behind
         if simulator.rtsp_port is not None:
             service.scanner.moving = self.films[config.name] = Film(behind, self.clock)

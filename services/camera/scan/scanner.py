@@ -25,7 +25,7 @@ from services.camera.scan.live import Live
 from services.camera.scan.modes import Modes
 from services.camera.scan.route import shortest
 from services.camera.scan.search import Scan
-from services.camera.scan.sightings import Eye
+from services.camera.scan.sightings import Eye, Sought
 from services.camera.scan.source import Moving, Source
 from services.camera.settings import Config
 from services.errors import DeviceError
@@ -212,11 +212,12 @@ class Scanner:
 
     def _results(self, scan: Scan) -> None:
         for marker, seen in sorted(scan.findings.seen.items()):
-            size = self.config.markers.of(marker)
-            result = sightings.result(self.eye, marker, seen, size, scan.name, scan.findings.mode_of(marker))
-            self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
-            self._publish(topics.CAMERA_MARKER.message(result, cam=self.config.name, marker=marker))
-            self.remember(result)
+            sought = Sought(marker, self.config.markers.of(marker), self.config.markers.prior(marker))
+            results = sightings.results(self.eye, sought, seen, scan.name, scan.findings.mode_of(marker))
+            for result in results:
+                self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
+            self._publish(topics.CAMERA_MARKER.message(results[0], cam=self.config.name, marker=marker))
+            self.remember(results[0])
 
     def _say(self, state: ScanState) -> None:
         self.bulletin.say(topics.CAMERA_SCAN_STATE, state)
