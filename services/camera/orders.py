@@ -13,10 +13,10 @@ from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, Ta
 from services.camera.commands import HideLens, PlaySound, RecordSound, VideoMode
 from services.camera.places import name_of
 from services.camera.requests import Direction, Refused, SetPicture
+from services.camera.scan.wish import ScanFor
 from services.payloads import Who
 
 RANKS: dict[Who, int] = {"scan": 0, "mission": 1, "human": 2}
-MOST_FRAMES = 50  # at each place of a scan
 LONGEST_S = 30.0  # of one Move order: it can be prolonged
 DIRECTIONS = {
     direction.name.replace("_", "").lower(): direction for direction in Direction if not direction.name.startswith("Z")
@@ -47,19 +47,6 @@ class MoveBy:
     direction: Direction
     speed: int
     seconds: float
-
-
-@dataclass(frozen=True)
-class ScanFor:
-    """Look for these targets at these places, so many frames at each; None: as configured.
-
-    `full`: every place, in both picture modes.
-    """
-
-    targets: tuple[int, ...] | None = None
-    places: tuple[str, ...] | None = None
-    full: bool = False
-    frames: int | None = None
 
 
 @dataclass(frozen=True)
@@ -237,11 +224,12 @@ def _scan(value: Any) -> Command:
         return ScanFor() if _flag(value) else EndScan()
     if unknown := set(value) - {"targets", "places", "full", "frames"}:
         raise ValueError(f"expected targets, places, full, frames, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
-    targets, places, frames = (value.get(key) for key in ("targets", "places", "frames"))
-    if frames is not None and not (isinstance(frames, int) and 1 <= frames <= MOST_FRAMES):
-        raise ValueError(f"expected 1 to {MOST_FRAMES} frames, got {str(frames)[:80]!r}")
-    full = _flag(value.get("full", "off"))
-    return ScanFor(_markers(targets) if targets else None, _names(places) if places else None, full, frames)
+    if (frames := value.get("frames")) not in (None, *range(1, 51)):
+        raise ValueError(f"expected 1 to 50 frames, got {str(frames)[:80]!r}")
+    told: dict[str, Any] = {
+        k: read(value[k]) for k, read in (("targets", _markers), ("places", _names)) if value.get(k)
+    }
+    return ScanFor(**told, full=_flag(value.get("full", "off")), frames=frames)
 
 
 def _routine(value: Any) -> Command:

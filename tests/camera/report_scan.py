@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from threading import Event
 from typing import Any
 from urllib.parse import quote
 
@@ -91,7 +92,5 @@ class ReportScan:
 
 
 def _pause(seconds: float) -> None:
-    """Waits, as the report's controller does."""
-    end = time.monotonic() + seconds
-    while (left := end - time.monotonic()) > 0:
-        time.sleep(left)
+    """Waits, as the report's scan does."""
+    Event().wait(seconds)

@@ -26,7 +26,10 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Task:
-    """One frame, and what to look for in it. `flip`, `mirror`: as it was delivered. `draw`: send the picture back."""
+    """One frame, and what to look for in it. `flip`, `mirror`: as it was delivered.
+
+    `draw`: send the picture back; one with a marker in it is sent back in any case.
+    """
 
     scan: str
     number: int
@@ -70,7 +73,8 @@ def analyse(task: Task) -> Analysed:
     except Away as error:
         return Analysed(task.scan, task.number, error=str(error))
     found = tuple(detect(image, task.dictionary, task.targets))
-    jpeg = pictures.encode(pictures.drawn(image, [(one.marker, one.corners) for one in found])) if task.draw else None
+    shown = task.draw or bool(found)
+    jpeg = pictures.encode(pictures.drawn(image, [(one.marker, one.corners) for one in found])) if shown else None
     return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), found, jpeg)
 
 
