@@ -140,6 +140,7 @@ class Config(Section):
     stream: StreamSettings = StreamSettings()
     snapshot: SnapshotSettings = SnapshotSettings()
     scan_pictures: Literal["stream", "snapshot"] = "stream"  # what a scan looks at, where the camera has a stream
+    hits: int = Field(default=100, ge=0, le=10000)  # pictures of what scans have seen that are kept; 0: none
     workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
 
     @model_validator(mode="before")
