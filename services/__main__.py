@@ -17,7 +17,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, stored, topics
 from services.bus import Message
-from services.command_line import mission
+from services.command_line import mission, openhab
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -176,6 +176,7 @@ def probe(
 
 stored.add_to(app)
 app.add_typer(mission.app, name="mission")
+app.add_typer(openhab.app, name="openhab")
 calibrate = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
 app.add_typer(calibrate, name="calibrate")
 

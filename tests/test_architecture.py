@@ -110,6 +110,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "sqlite3": ("services.storage.sqlite",),
     "croniter": ("services.persistence.cron",),
     "yaml": ("services.document",),
+    "lark": ("services.openhab.check.",),
     "typer": ("services.__main__", "services.stored", "services.command_line."),
     "rich": (
         "services.__main__",
@@ -142,10 +143,20 @@ MOVING = (
     "turning",
     "zooming",
 )
+OPENHAB_PURE = tuple(
+    f"services.openhab.{part}"
+    for part in (
+        "check.", "versions", "words", "lines", "semantics", "skill", "alexa", "site", "cameras", "state_description",
+        "readback",
+        "items", "mqtt", "things", "sitemap", "persist", "reactions", "dsl", "javascript", "widgets", "generate",
+        "importing",
+    )
+)  # fmt: skip
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
     "services.bus", "services.vision.", *(f"services.camera.ptz.{part}" for part in MOVING),
-    "services.camera.scan.search", "services.camera.scan.route", "services.camera.scan.stillness",
+    "services.camera.scan.search", "services.camera.scan.route", "services.camera.scan.footage",
+    "services.camera.scan.source", "services.camera.scan.findings",
     "services.camera.video.timing",
     "services.camera.brands.dahua.", "services.camera.alarm.motion", "services.camera.sound.g711",
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
@@ -154,7 +165,7 @@ PURE = (
     "services.bridge.confirm", "services.bridge.pace", "services.bridge.items", "services.bridge.template",
     "services.persistence.rows", "services.persistence.seen", "services.persistence.strategies",
     "services.persistence.cron", "services.persistence.filters", "services.persistence.decisions",
-    "services.history.answers", "services.history.plot", "services.storage.reading", "services.openhab.generate",
+    "services.history.answers", "services.history.plot", "services.storage.reading", *OPENHAB_PURE,
     "services.dashboard.view", "services.mission.plan", "services.mission.state", "services.mission.events",
     "services.mission.moment", "services.mission.standing", "services.mission.memory", "services.mission.telling",
     "services.simulators.agenda", "services.simulators.climate", "services.simulators.robot.route",
