@@ -17,6 +17,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, stored, topics
 from services.bus import Message
+from services.command_line import mission, openhab
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -174,6 +175,8 @@ def probe(
 
 
 stored.add_to(app)
+app.add_typer(mission.app, name="mission")
+app.add_typer(openhab.app, name="openhab")
 calibrate = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
 app.add_typer(calibrate, name="calibrate")
 
@@ -246,6 +249,10 @@ def _ended(result: OrderResult, json: bool) -> None:
 
 def main() -> None:
     """Runs the command line; every error of ours becomes a line and an exit code, never a traceback."""
+    if any(":=" in one for one in sys.argv):
+        from services.bridge import arguments  # roslaunch starts us
+
+        sys.argv[1:] = arguments.take(sys.argv[1:])
     try:
         app(standalone_mode=True)
     except ConfigError as error:

@@ -22,9 +22,11 @@ from rich.table import Table
 from services.simulated import Simulated, parts_of, services_of
 from services.virtual import VirtualApartment
 from tests import trials
+from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
 from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
+from tests.vision import positions
 
 LONGEST_S = 600.0
 HANGING = ("a", "b", "c", "d")
@@ -80,6 +82,13 @@ def scan(flat: VirtualApartment, rng: random.Random) -> float:
 
 
 @contextmanager
+def bridge() -> Iterator[Turn]:
+    """Turns of a bridge under traffic both ways, one for all."""
+    with bridge_trials.under_traffic() as traffic:
+        yield traffic.turn
+
+
+@contextmanager
 def writer(trial: Callable[[writer_trials.Site, random.Random], float]) -> Iterator[Turn]:
     """Turns with the writer, its broker and its database alone."""
     with tempfile.TemporaryDirectory() as name, writer_trials.site(Path(name)) as one:
@@ -128,11 +137,13 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
         25,
         "s until it shows",
     ),
+    "bridge": (bridge, 30, "s until all flows again"),
     "persistence": (lambda: writer(writer_trials.trouble), 100, "messages, none lost or doubled"),
     "broker-kills": (lambda: writer(lambda one, rng: lost_by_the_broker(one, rng, backlog=False)), 10, "% lost"),
     "broker-kills-backlog": (lambda: writer(lambda one, rng: lost_by_the_broker(one, rng, backlog=True)), 10, "% lost"),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
+    "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 
 

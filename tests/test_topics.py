@@ -121,7 +121,13 @@ def test_a_message_is_read_back_as_what_was_sent() -> None:
     assert got.payload == PositionSet(pan=10.0, tilt=-3.5)
 
 
-WANTED = {"history/get": b'{"id": "q"}'}  # the others take what follows
+WANTED = {  # the others take what follows
+    "history/get": b'{"id": "q"}',
+    "mission/<robot>/order": b'{"find": 582}',
+    "mission/<robot>/where": b'{"marker": 582, "id": "q"}',
+    "robot/<robot>/goto": b'{"point": "Sofa"}',
+    "robot/<robot>/cancel": b"{}",
+}
 COMMANDS = [pytest.param(row, id=row.pattern) for row in TABLE if row.kind is Kind.COMMAND]
 
 

@@ -4,6 +4,6 @@ Listens to the MQTT filters of the rules and to `diagnostics/#`; on ROS to the t
 Says what the rules make of it, `/diagnostics` once a second, and `diagnostics/bridge`.
 """
 
-from services.bridge.service import Config, check, start
+from services.bridge.program import Config, check, start
 
 __all__ = ["Config", "check", "start"]

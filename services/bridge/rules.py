@@ -43,7 +43,9 @@ class Rule(Section):
     latch: bool = False  # ROS keeps the newest message for who comes later
     replay: bool = False  # who comes later is sent the newest message of every MQTT topic, and only he
     queue: int = Field(default=100, ge=1, le=100_000)  # per subscriber; the oldest goes when it is full
+    rate: float | None = Field(default=None, gt=0)  # per second and topic at most; of what comes faster the newest goes
     retain: bool = False  # to_mqtt, on a topic of your own; those of the table know it themselves
+    qos: Literal[0, 1] = 1  # the same; what comes from MQTT has that of its publisher
 
     @field_validator("ros")
     @classmethod
@@ -83,8 +85,8 @@ class Rule(Section):
         return self
 
     def _check_to_ros(self) -> None:
-        if self.payload is not None or self.retain:
-            raise ValueError("expected fields, and neither payload nor retain, in a rule to_ros")
+        if self.payload is not None or self.retain or self.qos != 1:
+            raise ValueError("expected fields, and neither payload, retain nor qos, in a rule to_ros")
         names = LEVEL.findall(self.mqtt)
         if len(names) != len(set(names)):
             raise ValueError("expected every {name} once in mqtt")
@@ -205,7 +207,7 @@ def _said(rule: Rule, topic: str, text: str, now: float) -> Message:
     except UnicodeEncodeError as error:
         raise BadMessage(f"{rule.ros}: expected a text that UTF-8 can carry, {error.reason}") from error
     if _is_own(topic):
-        return Message(topic, payload, retain=rule.retain)
+        return Message(topic, payload, retain=rule.retain, qos=rule.qos)
     known = topics.read(Message(topic, payload, received=now), now)
     return known.topic.message(known.payload, **known.levels)
 

@@ -18,17 +18,18 @@ from services.errors import BadMessage
 from services.topic import STALE_AFTER_S
 from services.topic import Kind as Kind
 from services.topic import Topic as Topic
-from services.topics import camera, discovery, history, home
+from services.topics import camera, discovery, history, home, mission
 from services.topics.camera import *
 from services.topics.discovery import *
 from services.topics.history import *
 from services.topics.home import *
+from services.topics.mission import *
 
 TEXT_LIMIT = 256 * 1024
 BLOB_LIMIT = 4 * 1024 * 1024
 
 TABLE: tuple[Topic, ...] = tuple(
-    row for rows in (home, camera, discovery, history) for row in vars(rows).values() if isinstance(row, Topic)
+    row for rows in (home, camera, mission, history, discovery) for row in vars(rows).values() if isinstance(row, Topic)
 )
 
 

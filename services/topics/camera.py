@@ -81,7 +81,7 @@ CAMERA_MARKER = Topic(
     Kind.STATE,
     p.ScanResult,
     ("camera-<cam>",),
-    (*SHOWN, "openhab"),
+    (*SHOWN, "openhab", "camera-<cam>"),
     "the newest scan result of that marker",
 )
 CAMERA_SCAN_IMAGE = Topic(
@@ -98,6 +98,14 @@ CAMERA_SNAPSHOT_GET = Topic(
 CAMERA_SNAPSHOT = Topic("camera/<cam>/snapshot", Kind.BLOB, bytes, ("camera-<cam>",), (*SHOWN, "openhab"), "a JPEG")
 CAMERA_AUDIO = Topic(
     "camera/<cam>/audio", Kind.EVENT, p.Audio, ("camera-<cam>",), (*SHOWN, "openhab"), "a recording is done"
+)
+CAMERA_CALIBRATION = Topic(
+    "camera/<cam>/calibration",
+    Kind.EVENT,
+    p.Calibration,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "how far a calibration is, what to show the camera next, and what came out",
 )
 CAMERA_STREAM = Topic(
     "camera/<cam>/stream",

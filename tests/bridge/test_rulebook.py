@@ -31,6 +31,8 @@ def test_the_shipped_rules_have_the_names_that_were_promised() -> None:
         "/ip_camera_scan/result/place",
         "/ip_camera_scan/result/position",
         "/ip_camera_scan/result/pose",
+        "/ip_camera_scan/image/compressed",
+        "/ip_camera_snapshot/compressed",
     }
     assert names == {"/iot_updates", "/iot_command", "/iot_set"} | camera | {f"/ip2{name}" for name in camera}
 
