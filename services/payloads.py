@@ -228,6 +228,25 @@ class ScanResult(Payload):
         return text
 
 
+class Calibration(Payload):
+    """`camera/<cam>/calibration`: how far it is, what to show next, and at its end what came out.
+
+    `regions`: whether the board was shown there, rows from the top. `values`: each number with its standard deviation;
+    of a mount also `mount`, as the configuration writes it. `report` is a page with pictures, where the service runs.
+    """
+
+    what: Literal["lens", "mount"]
+    state: Literal["running", "done", "failed", "cancelled"]
+    progress: float = Field(default=0.0, ge=0.0, le=1.0)
+    views: int = 0
+    said: str = ""
+    regions: list[list[bool]] = []
+    values: dict[str, tuple[float, float]] = {}
+    mount: dict[str, Free] | None = None
+    file: str | None = None
+    report: str | None = None
+
+
 class Stream(Payload):
     """`camera/<cam>/stream`: which streams are on, and where the picture can be had without a password."""
 

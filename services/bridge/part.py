@@ -27,6 +27,10 @@ class Part(Protocol):
         """Takes note of what a robot said to the bus."""
         return None
 
+    def heard_ros(self, topic: str, fields: Fields, now: float) -> Iterable[Message]:
+        """Takes what a robot said on one of its topics; BadMessage when it is nothing of that kind."""
+        return ()
+
     def called(self, name: str, call: Call, now: float) -> Iterable[Message]:
         """Takes a call of one of its services."""
         return ()

@@ -15,6 +15,8 @@ from services.bridge import arguments, mapfile, messages, rulebook
 from services.bridge.confirm import Confirm
 from services.bridge.darkroom import Wanted
 from services.bridge.items import Items
+from services.bridge.lenses import Lenses
+from services.bridge.missions import Missions
 from services.bridge.node import Outlet, Ports, ports
 from services.bridge.part import Part
 from services.bridge.pictures import Pictures
@@ -47,6 +49,7 @@ class Config(Section):
     node: str = Field(default="iot_bridge", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # its name in the ROS graph
     master_uri: str | None = None  # http://host:11311; without it ROS_MASTER_URI of the environment
     apartment: tuple[float, float, float] = (0.0, 0.0, 0.0)  # its origin on the robot's map: x, y in m, yaw in degrees
+    robot: str | None = None  # its name on the bus, for /iot_mission; None: no missions here
     map: Path | None = None  # a map_server YAML, shown on /map; relative to the configuration
     simulated: bool = False  # a ROS node in memory, where there is no ROS
     name: str = "bridge"
@@ -106,6 +109,9 @@ def _parts(config: Config) -> tuple[Part, ...]:
         mounts = {cam: one.mount for cam, one in config.camera_sections.items() if one.mount is not None}
         snapshots = config.state / "snapshots" if config.state else None
         parts += [Tree(config.cameras, mounts, config.apartment), Snapshots(config.cameras, snapshots)]
+        parts.append(Lenses(config.cameras))
+    if config.robot is not None:
+        parts.append(Missions(config.robot))
     if not config.simulated and (config.cameras or config.map):
         parts.append(Pictures(_wanted(config)))
     return tuple(parts)

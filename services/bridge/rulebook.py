@@ -17,7 +17,18 @@ from services.bridge.rules import Rule
 from services.document import Document, Path_
 
 DIAGNOSTICS = "/diagnostics"  # gathered by the bridge itself, once a second
-OWN = (DIAGNOSTICS, "/tf", "/tf_static", "/joint_states", "/map", "/map_metadata", "/clock", "/rosout")
+OWN = (
+    DIAGNOSTICS,
+    "/tf",
+    "/tf_static",
+    "/joint_states",
+    "/map",
+    "/map_metadata",
+    "/clock",
+    "/rosout",
+    "/iot_mission",
+    "/iot_mission/state",
+)
 Check = Callable[[Rule], Iterable[tuple[Path_, str]]]
 Numbered = tuple[int, Rule]  # where it stands in the file, and the rule for one camera
 

@@ -18,7 +18,7 @@ from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Node
 from services.bridge.pace import Pace
 from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard, Rule, read, to_mqtt, to_ros
-from services.bus import Message
+from services.bus import Message, topic_matches
 from services.errors import ApartmentError, BadMessage
 from services.home import Home, Item
 from services.payloads import Diagnostic
@@ -51,9 +51,10 @@ class Bridge:
         self._slow_to_ros: Pace[tuple[str, Fields, str]] = Pace()
         self._slow_to_mqtt: Pace[Message] = Pace()
         rows = (topics.DIAGNOSTICS, *(row for part in parts for row in part.rows))
-        self.subscribes = tuple(dict.fromkeys([*(rule.filter for rule in self._to_ros), *(row.filter for row in rows)]))
+        self.subscribes = _apart([*(rule.filter for rule in self._to_ros), *(row.filter for row in rows)])
         self._listening = {row: tuple(part for part in parts if row in part.rows) for row in rows}
         self._serving = {server.name: part for part in parts for server in part.ports.servers}
+        self._hearing = {inlet.topic: part for part in parts for inlet in part.ports.inlets}
         self._rules_for = lru_cache(REMEMBERED_TOPICS)(self._find_rules)
         self._health = Health()
         self._own_due = 0.0
@@ -155,6 +156,7 @@ class Bridge:
             asked = [(rule, message) for rule, message in wanted if not self._is_refresh(message)]
             for _, message in asked:
                 self._check_home(message)
+            own = list(self._hearing[topic].heard_ros(topic, fields, now)) if topic in self._hearing else []
         except BadMessage as error:
             self.counters["refused"] += 1
             text = f"{topic} {_short(fields)}: {error}"
@@ -163,7 +165,7 @@ class Bridge:
             raise BadMessage(text) from error
         if len(asked) < len(wanted):
             self.node.refresh()
-        allowed = [message for rule, message in asked if self._may_go(rule, message, now)]
+        allowed = [*own, *(message for rule, message in asked if self._may_go(rule, message, now))]
         self.counters["to_mqtt"] += len(allowed)
         for message in allowed:
             for part in self.parts:
@@ -195,6 +197,12 @@ class Bridge:
         if name not in self._home.ros_items:
             raise BadMessage(f"expected an item of group ROS, got {name!r}")
         return self._home.ros_items[name]
+
+
+def _apart(filters: list[str]) -> tuple[str, ...]:
+    """Filters without those that another one covers: a broker may send what matches two of them twice."""
+    each = dict.fromkeys(filters)
+    return tuple(one for one in each if not any(other != one and topic_matches(other, one) for other in each))
 
 
 def _known(topic: str) -> tuple[topics.Topic | None, dict[str, str]]:

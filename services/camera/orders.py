@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, TakeLens
 from services.camera.commands import HideLens, PlaySound, RecordSound, VideoMode
 from services.camera.places import name_of
 from services.camera.requests import Direction, Refused, SetPicture
@@ -49,10 +50,11 @@ class MoveBy:
 
 @dataclass(frozen=True)
 class ScanFor:
-    """Look for these targets at these places; None: the configured ones."""
+    """Look for these targets at these places; None: the configured ones. `full`: every place, in both picture modes."""
 
     targets: tuple[int, ...] | None = None
     places: tuple[str, ...] | None = None
+    full: bool = False
 
 
 @dataclass(frozen=True)
@@ -126,8 +128,9 @@ class Calibrate:
     """Learn the motors: turn with every speed."""
 
 
-Motor = GotoPlace | LookAt | MoveBy | ScanFor | Calibrate
-Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Broadcast | Restart  # all but its motors
+Calibration = Calibrate | CalibrateLens | CalibrateMount
+Motor = GotoPlace | LookAt | MoveBy | ScanFor | Calibration
+Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Broadcast | Restart | TakeLens  # all but its motors
 Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Itself
 
 
@@ -227,10 +230,10 @@ def _zoom(value: Any) -> Command:
 def _scan(value: Any) -> Command:
     if not isinstance(value, dict):
         return ScanFor() if _flag(value) else EndScan()
-    if unknown := set(value) - {"targets", "places"}:
-        raise ValueError(f"expected targets and places, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
-    targets, places = value.get("targets"), value.get("places")
-    return ScanFor(_markers(targets) if targets else None, _names(places) if places else None)
+    if unknown := set(value) - {"targets", "places", "full"}:
+        raise ValueError(f"expected targets, places and full, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
+    targets, places, full = value.get("targets"), value.get("places"), _flag(value.get("full", "off"))
+    return ScanFor(_markers(targets) if targets else None, _names(places) if places else None, full)
 
 
 def _routine(value: Any) -> Command:
@@ -271,6 +274,9 @@ READERS: dict[str, Callable[[Any], Command]] = {
     "AudioPlay": lambda value: PlaySound.read(_text(value)),
     "Reboot": _restart,
     "CalibratePtz": _calibrate,
+    "CalibrateLens": CalibrateLens.read,
+    "CalibrateMount": CalibrateMount.read,
+    "SetCameraInfo": TakeLens.read,
 }
 KEYS = {name.lower(): (name, reader) for name, reader in READERS.items()}
 

@@ -9,6 +9,7 @@ from services import document
 from services.camera.address import Address
 from services.camera.alarm.listener import Listener
 from services.camera.calibration import levels
+from services.camera.calibration.study import Studio
 from services.camera.device import Device
 from services.camera.places import Places
 from services.camera.scan.analysis import Pool
@@ -33,7 +34,8 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
         watchdog = stack.enter_context(closing(Watchdog(config.brand, address)))
         device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell, owing=gate.owe)
         made_sound = getattr(brand(config.brand), "sound", None)
-        sender = stack.enter_context(closing(Desk(device, made_sound(address, gate) if made_sound else None, post)))
+        desk = Desk(device, made_sound(address, gate) if made_sound else None, post)
+        sender = stack.enter_context(closing(Studio(desk, post)))
         listener = _listener(config, address, gate, post)
         if listener is not None:
             stack.callback(listener.close)

@@ -16,8 +16,10 @@ from zlib import crc32
 from services.bus import Message
 from services.storage import SeenTurn
 
-REMEMBERED = 2000  # packets; the broker sends 1000 at most before it wants an acknowledgement (its window)
-SLOTS = 2048  # turns that are stored, one row each, the oldest overwritten: enough when each has but one message
+# All packet ids that there are. The broker's window (1000) would do if it kept it: while messages are queued behind the
+# window mosquitto 2.0.11 lets several new ones out for one acknowledgement; 7000 were seen under way at once.
+REMEMBERED = 65_535
+SLOTS = 65_536  # turns that are stored, one row each, the oldest overwritten: enough when each has but one message
 PAIR = struct.Struct("<HI")
 
 

@@ -99,6 +99,14 @@ CAMERA_SNAPSHOT = Topic("camera/<cam>/snapshot", Kind.BLOB, bytes, ("camera-<cam
 CAMERA_AUDIO = Topic(
     "camera/<cam>/audio", Kind.EVENT, p.Audio, ("camera-<cam>",), (*SHOWN, "openhab"), "a recording is done"
 )
+CAMERA_CALIBRATION = Topic(
+    "camera/<cam>/calibration",
+    Kind.EVENT,
+    p.Calibration,
+    ("camera-<cam>",),
+    (*SHOWN, "openhab"),
+    "how far a calibration is, what to show the camera next, and what came out",
+)
 CAMERA_STREAM = Topic(
     "camera/<cam>/stream",
     Kind.STATE,

@@ -37,6 +37,11 @@ MISPLACED = 4.0  # standard deviations of a place that is told to be wrong
 FLAT = 0.15  # m; markers spread less than this across their line tell nothing about the turn around it
 
 
+def best_pose(look: Look, size_m: float) -> Transform | None:
+    """The marker in the camera, the likelier of its two poses; None when no pose explains its corners."""
+    return next(iter(_candidates(look, size_m)), None)
+
+
 @dataclass(frozen=True, eq=False)
 class Placed:
     """What came out for one marker: `offset` (3,) in metres from where it was said to be, and what its looks leave."""
@@ -49,12 +54,21 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class MountFit:
-    """`covariance` (6, 6) of place (m) and turn (rad, about the apartment's axes); `off_px` (n, 4, 2) of each look."""
+    """`covariance` (12, 12) of place (m), turn (rad, about the apartment's axes), tilt's zero, roll, and the arms.
+
+    `off_px` (n, 4, 2): what each of the looks leaves, pixels.
+    """
 
     mount: Mount
     covariance: Array
     markers: Mapping[int, Placed]
+    looks: tuple[Look, ...]
     off_px: Array
+
+    @property
+    def axes_doubt(self) -> Array:
+        """(6,) standard deviations of tilt's zero and the roll (rad), and of the arms (m)."""
+        return np.sqrt(np.diag(self.covariance)[6:])
 
     @property
     def position_doubt(self) -> Array:
@@ -169,8 +183,8 @@ def _told(problem: Problem, state: State, cost: float, information: Array) -> Mo
     }
     freedom = 8 * len(problem.looks) + 3 * len(problem.ids) - CAMERA - 6 * len(problem.ids) + 8
     grown = max(1.0, cost / max(freedom, 1))  # where they disagree by more than they should
-    covariance = np.asarray(grown * np.linalg.inv(information)[:6, :6], float)
-    return MountFit(mount, covariance, markers, off)
+    covariance = np.asarray(grown * np.linalg.inv(information)[:CAMERA, :CAMERA], float)
+    return MountFit(mount, covariance, markers, problem.looks, off)
 
 
 def _off_px(problem: Problem, state: State, mount: Mount, index: int) -> Array:

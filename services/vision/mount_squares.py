@@ -54,6 +54,8 @@ class Known:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
+    """What is given: the looks, where the markers were said to be, and what is guessed of the mount."""
+
     looks: tuple[Look, ...]
     ids: list[int]
     said: Array  # (m, 3)
@@ -78,15 +80,18 @@ class State:
 
 
 def turned(vector: Array) -> Array:
+    """The rotation, 3x3, of a rotation vector in radians."""
     return np.asarray(cv2.Rodrigues(np.asarray(vector, float))[0], float)
 
 
 def axes_of(mount: Mount) -> Array:
+    """Tilt's zero and the sensor's roll (rad), and the two arms (m), (6,)."""
     angles = (radians(mount.tilt_zero_deg), radians(mount.sensor_roll_deg))
     return np.array([*angles, *mount.pan_to_tilt_m, *mount.tilt_to_lens_m], float)
 
 
 def with_axes(guess: Mount, axes: Array) -> Mount:
+    """A mount with these axes."""
     zero, roll, forward, away, along, above = (float(value) for value in axes)
     return replace(
         guess,

@@ -83,6 +83,9 @@ class Lab:
     port: int
     environment: dict[str, str]
     folder: Path
+    broker: ExitStack
+    master: ros.Master
+    bridge_pid: int = 0
 
     @contextmanager
     def part(self, name: str, *, started: bool = False, **arguments: Any) -> Iterator[Part]:
@@ -98,6 +101,12 @@ class Lab:
                 assert pipe
                 pipe.close()
 
+    def restart_broker(self) -> None:
+        """As if its machine had been reset, and nothing was kept: on the same port, without what it remembered."""
+        self.broker.close()
+        (self.folder / "mosquitto" / "mosquitto.db").unlink(missing_ok=True)
+        self.broker.enter_context(mosquitto.private(self.folder / "mosquitto", port=self.port, anonymous=True))
+
     @contextmanager
     def bridge(self) -> Iterator[None]:
         """The service as an installation runs it."""
@@ -111,6 +120,7 @@ class Lab:
             assert process.stdout
             while not process.stdout.readline().startswith("READY"):
                 assert process.poll() is None, (self.folder / "bridge.log").read_text()
+            self.bridge_pid = process.pid
             yield
         finally:
             end(process)
@@ -123,14 +133,15 @@ def lab() -> Iterator[Lab]:
     """Private peers, and the configuration of a home of 200 numbers; Missing without ROS or mosquitto."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        broker = stack.enter_context(mosquitto.private(folder / "mosquitto", anonymous=True))
+        brokers = stack.enter_context(ExitStack())
+        broker = brokers.enter_context(mosquitto.private(folder / "mosquitto", anonymous=True))
         master = stack.enter_context(ros.private(folder / "ros"))
         items = {item: {"type": "Number", "label": item} for item in ITEMS}
         (folder / "home.yaml").write_text(json.dumps({"items": items}))
         (folder / "bridge.yaml").write_text((ROOT / "config" / "bridge.yaml").read_text() + RULES)
         config = {"bus": {"port": broker.port}, "state": str(folder / "state"), "home": "home.yaml", "bridge": {}}
         (folder / "apartment.yaml").write_text(json.dumps(config))
-        yield Lab(broker.port, {**os.environ, **master.env, "PYTHONPATH": str(ROOT)}, folder)
+        yield Lab(broker.port, {**os.environ, **master.env, "PYTHONPATH": str(ROOT)}, folder, brokers, master)
 
 
 def to_ros(lab: Lab, qos: int, count: int, rate: float, through: str) -> dict[str, float]:

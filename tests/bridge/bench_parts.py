@@ -211,9 +211,39 @@ def loop_to_mqtt(port: int, topic: str, qos: int) -> None:
     sys.stdin.readline()
 
 
+def traffic(out: str, back: str, keys: list[str], rate: float) -> None:
+    """Says numbers for ever, and tells a few times a second which it has said, with when, and what it has heard."""
+    from diagnostic_msgs.msg import KeyValue
+
+    rospy, lock = ros("traffic"), threading.Lock()
+    heard: list[tuple[str, str]] = []
+    said: list[tuple[int, float]] = []
+
+    def take(message: Any) -> None:
+        with lock:
+            heard.append((message.key, message.value))
+
+    subscriber = rospy.Subscriber(back, KeyValue, take, tcp_nodelay=True)
+    publisher = rospy.Publisher(out, KeyValue, tcp_nodelay=True, queue_size=10_000)
+    connected(subscriber)
+    connected(publisher)
+    tell("READY")
+    began, number = time.monotonic(), 0
+    while True:
+        threading.Event().wait(0.2)
+        while number < (time.monotonic() - began) * rate:
+            said.append((number, time.monotonic()))
+            publisher.publish(keys[number % len(keys)], str(number))
+            number += 1
+        with lock:
+            taken, heard[:] = list(heard), []
+        tell({"heard": taken, "said": said})
+        said = []
+
+
 PARTS: dict[str, Callable[..., None]] = {
     part.__name__: part
-    for part in (blast, hear_mqtt, hear_ros, say_ros, round_trip, newcomer, loop_to_ros, loop_to_mqtt)
+    for part in (blast, hear_mqtt, hear_ros, say_ros, round_trip, newcomer, loop_to_ros, loop_to_mqtt, traffic)
 }
 
 if __name__ == "__main__":

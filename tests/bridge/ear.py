@@ -39,6 +39,7 @@ def heard(message: Any, topic: str) -> None:
     elif hasattr(message, "K"):
         told |= {"size": [message.width, message.height], "K": list(message.K), "D": list(message.D)}
     elif hasattr(message, "status"):
+        told["levels"] = {one.name: one.level for one in message.status}
         told["status"] = {one.name: {pair.key: pair.value for pair in one.values} for one in message.status}
     sys.stdout.write(json.dumps(told) + "\n")
     sys.stdout.flush()

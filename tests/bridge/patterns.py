@@ -22,9 +22,9 @@ SIZE = (1152, 648)
 Pixels = NDArray[np.uint8]
 
 
-def drawn(number: int) -> bytes:
-    """A picture as JPEG that shows a number."""
-    pixels = np.full((SIZE[1], SIZE[0], 3), 90, np.uint8)
+def drawn(number: int, colour: tuple[int, int, int] = (90, 90, 90)) -> bytes:
+    """A picture as JPEG that shows a number, on that colour (BGR)."""
+    pixels = np.full((SIZE[1], SIZE[0], 3), colour, np.uint8)
     for bit in range(BITS):
         pixels[:BLOCK, bit * BLOCK : (bit + 1) * BLOCK] = 255 * (number >> bit & 1)
     done, jpeg = cv2.imencode(".jpg", pixels)
@@ -49,7 +49,7 @@ class Stream:
 
 
 @contextmanager
-def stream(fps: float) -> Iterator[Stream]:
+def stream(fps: float, colour: tuple[int, int, int] = (90, 90, 90)) -> Iterator[Stream]:
     """The camera service's own port, fed with numbers."""
     newest = Newest(Upright(flip=True, mirror=True))
     proxy = Proxy("ip1", StreamSettings(fps=60), newest, lambda: True, lambda: True)
@@ -60,7 +60,7 @@ def stream(fps: float) -> Iterator[Stream]:
         number, due = 0, time.monotonic()
         while not stopping.wait(max(0.0, due - time.monotonic())):
             number, due = number % (2**BITS - 1) + 1, due + 1 / fps
-            running.jpegs[number] = drawn(number)
+            running.jpegs[number] = drawn(number, colour)
             running.put[number] = time.monotonic()
             running.watchers.append(newest.watchers)
             now = time.time()

@@ -14,6 +14,7 @@ import pytest
 from services.bridge import Config, start
 from services.bridge.confirm import ANSWER_S
 from services.bridge.snapshots import ANSWER_S as PICTURE_S
+from services.errors import BadMessage
 from services.vision.frames import Mount, Transform, camera_in_apartment
 from tests.bridge.test_service import CONFIG, HOME, NOW, RESULT, Driven
 
@@ -28,7 +29,7 @@ JPEG = b"\xff\xd8 a picture \xff\xd9"
 def bridge(tmp_path: Path) -> Iterator[Driven]:
     config = {"home": ROOMS, "cameras": ("ip1", "ip2"), "folder": CONFIG, "state": tmp_path, "simulated": True,
               "camera_sections": {"ip1": {"mount": MOUNT, "brand": "amcrest"}, "ip2": {"mount": 3}},
-              "apartment": [1.0, 2.0, 90.0]}  # fmt: skip
+              "apartment": [1.0, 2.0, 90.0], "robot": "tiago"}  # fmt: skip
     posted: list[Any] = []
     with start(Config.model_validate(config), posted.append) as service:
         driven = Driven(service, posted)
@@ -149,6 +150,65 @@ def test_a_camera_that_is_away_is_not_asked(bridge: Driven) -> None:
     assert call(bridge, "/snapshots_ip_camera") == (
         [{"success": False, "message": "ip1 is locked: a wrong password"}], [],
     )  # fmt: skip
+
+
+INFO = {"width": 640, "height": 360, "distortion_model": "plumb_bob", "D": [0.1, 0, 0, 0, 0], "K": [1.0] * 9,
+        "R": [0.0] * 9, "P": [0.0] * 12, "binning_x": 0, "header": {}}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("state", "answer"),
+    [
+        ("done", {"success": True, "status_message": "the camera has it"}),
+        ("refused", {"success": False, "status_message": "refused: too wide"}),
+    ],
+)
+def test_a_calibration_is_handed_to_the_camera_and_its_word_to_the_calibrator(
+    bridge: Driven, state: str, answer: Any
+) -> None:
+    answers: list[Any] = []
+    bridge.node.call("/ip_camera_rtsp/set_camera_info", {"camera_info": INFO}, answers.append)
+    ((order),) = [out for message in bridge.take() for out in bridge.service.handle(message, NOW)]
+    said = json.loads(order.payload)
+    assert order.topic == "camera/ip1/order/SetCameraInfo"
+    assert said["value"] == {key: INFO[key] for key in ("width", "height", "distortion_model", "D", "K", "R", "P")}
+    for step, error in (("accepted", None), ("running", None), (state, "too wide")):
+        result = {"id": said["id"], "key": "SetCameraInfo", "value": {}, "state": step, "error": error}
+        bridge.hears("camera/ip1/order_result", result)
+    assert answers == [answer]
+
+
+def test_a_calibration_that_nobody_takes_is_told(bridge: Driven) -> None:
+    answers: list[Any] = []
+    bridge.node.call("/ip2/set_camera_info", {"camera_info": INFO}, answers.append)
+    assert [out.topic for m in bridge.take() for out in bridge.service.handle(m, NOW)] == [
+        "camera/ip2/order/SetCameraInfo"
+    ]
+    list(bridge.service.tick(NOW + 20))
+    assert answers == [{"success": False, "status_message": "the camera's service does not answer"}]
+
+
+def test_a_mission_is_ordered_followed_and_cancelled(bridge: Driven) -> None:
+    ((topic, order),) = bridge.robot_says("/iot_mission", "find", "582")
+    assert (topic, json.loads(order)["find"]) == ("mission/tiago/order", 582)
+    going = {
+        "state": "go",
+        "marker": 582,
+        "place": "Kitchen",
+        "reason": "last seen there",
+        "since": "2026-01-31T07:05:00Z",
+    }
+    bridge.hears("mission/tiago/state", going)
+    bridge.hears("mission/other/state", {**going, "state": "failed"})
+    assert said(bridge, "/iot_mission/state") == [{"key": "go", "value": "Kitchen, last seen there"}]
+    answers, asked = call(bridge, "/iot_mission/cancel")
+    assert (answers[0]["success"], asked) == (True, ["mission/tiago/order"])
+
+
+@pytest.mark.parametrize(("key", "value"), [("find", "a marker"), ("find", "-1"), ("find", "10000"), ("eat", "582")])
+def test_another_word_to_the_mission_is_refused(bridge: Driven, key: str, value: str) -> None:
+    with pytest.raises(BadMessage, match="expected key find"):
+        bridge.robot_says("/iot_mission", key, value)
 
 
 def status(bridge: Driven, name: str, now: float) -> tuple[int, str]:

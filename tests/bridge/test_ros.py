@@ -107,28 +107,17 @@ def test_what_a_robot_says_arrives_or_is_refused_with_the_reason(master: ros.Mas
 def test_it_comes_back_after_the_master_was_killed(master: ros.Master, run_bridge: Run) -> None:
     bridge = run_bridge(master.env, LAMP)
     bridge.hears("home/Lamp/state", "ON")
-    for turn in (1, 2, 3):
+    for turn in (1, 2):
         bridge.registers(turn)
         assert 'value: "ON"' in rostopic(master, "echo", "-n1", "/iot_updates")
         seen = len(bridge.said)
         pub(master, "/iot_command", KEY_VALUE, f"{{key: Lamp, value: '{'ON' if turn % 2 else 'OFF'}'}}")
         bridge.says("home/Lamp/command", lambda text: text in ("ON", "OFF"), since=seen)
-        assert "success: True" in snapshot(master, bridge)
         master.kill()
         master.start()
         back = time.monotonic()
         wait_until(lambda: publishers(master, "/iot_updates") == ["/iot_bridge"], "registered", PATIENCE_S)
         assert time.monotonic() - back < 2.0
-
-
-def snapshot(master: ros.Master, bridge: BridgeProcess) -> str:
-    """What `rosservice call` prints; the camera answers as soon as it is asked."""
-    seen = len(bridge.said)
-    command = ["rosservice", "call", "/snapshots_ip_camera"]
-    with subprocess.Popen(command, env={**os.environ, **master.env}, stdout=subprocess.PIPE, text=True) as call:
-        bridge.says("camera/ip1/snapshot/get", lambda text: True, since=seen)
-        bridge.hears("camera/ip1/snapshot", "a picture")
-        return call.communicate(timeout=PATIENCE_S)[0]
 
 
 def test_without_a_master_at_the_start_nothing_is_lost(tmp_path: Path, run_bridge: Run) -> None:

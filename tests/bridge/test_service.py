@@ -95,9 +95,8 @@ def bridge() -> Iterator[Driven]:
 def test_it_asks_for_what_the_rules_need(bridge: Driven) -> None:
     assert set(bridge.service.subscribes) == {
         "home/+/state", "diagnostics/#", "camera/ip1/scan/result", "camera/ip2/scan/result",
-        "camera/ip1/motion", "camera/ip2/motion", "camera/ip1/snapshot", "camera/ip2/snapshot",
-        "camera/ip1/scan/image", "camera/ip2/scan/image",
-        "camera/+/position", "camera/+/marker/+", "camera/+/status", "camera/+/snapshot",
+        "camera/ip1/motion", "camera/ip2/motion", "camera/ip1/scan/image", "camera/ip2/scan/image",
+        "camera/+/position", "camera/+/marker/+", "camera/+/status", "camera/+/snapshot", "camera/+/order_result",
     }  # fmt: skip
 
 

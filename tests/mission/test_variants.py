@@ -70,7 +70,10 @@ class Story:
 
 @pytest.fixture
 def story(tmp_path: Path) -> Iterator[Story]:
-    with virtual_flat(tmp_path, {"targets: [582]": "targets: [582]\n    frames: 1"}) as flat:
+    def one_frame_a_place(config: Path) -> None:
+        config.write_text(config.read_text().replace("targets: [582]", "targets: [582]\n    frames: 1"))
+
+    with virtual_flat(tmp_path, one_frame_a_place) as flat:
         yield Story(flat)
 
 

@@ -17,7 +17,7 @@ GUESS = Mount((0.0, 0.0, 0.0), "ceiling", **ARMS)
 
 def test_five_markers_that_are_a_centimetre_off_give_the_mount_to_a_centimetre_and_a_third_of_a_degree() -> None:
     rng = np.random.default_rng(1)
-    trials = [mount_trial(rng) for _ in range(6)]
+    trials = [mount_trial(rng) for _ in range(5)]
     assert np.median([one.place_m for one in trials]) <= 0.010
     assert max(one.place_m for one in trials) <= 0.020
     assert max(one.turn_deg for one in trials) <= 0.45
@@ -45,7 +45,7 @@ def test_without_any_error_it_is_exact_in_every_number(kind: str) -> None:
 
 def test_what_it_says_about_its_doubt_is_true() -> None:
     rng, sigmas = np.random.default_rng(3), []
-    for _ in range(7):
+    for _ in range(5):
         truth = hung(rng)
         markers = spread(rng, truth, 5)
         known = {

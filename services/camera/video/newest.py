@@ -75,6 +75,7 @@ class Newest:
         self._frame: Frame | None = None
         self._taken = 0  # number of the newest frame that somebody took
         self._watchers = 0
+        self._taps: list[Callable[[Frame], None]] = []
         self._closed = False
         self._changed = Condition()
         self._encoding = Lock()
@@ -90,6 +91,15 @@ class Newest:
         finally:
             with self._changed:
                 self._watchers -= 1
+
+    @contextmanager
+    def tapped(self, see: Callable[[Frame], None]) -> Iterator[None]:
+        """While it lasts, every picture is shown to `see`, on the thread that brings it."""
+        self._taps.append(see)
+        try:
+            yield
+        finally:
+            self._taps.remove(see)
 
     @property
     def wanted(self) -> bool:
@@ -107,8 +117,10 @@ class Newest:
             self.frames += 1
             if self._frame is not None and self._taken < self._frame.number and self.wanted:
                 self.dropped += 1
-            self._frame = Frame(self.frames, develop, exposure, arrived, self.upright, jpeg)
+            self._frame = frame = Frame(self.frames, develop, exposure, arrived, self.upright, jpeg)
             self._changed.notify_all()
+        for see in list(self._taps):
+            see(frame)
 
     @property
     def frame(self) -> Frame | None:

@@ -34,6 +34,17 @@ def encode(image: Image, quality: int = QUALITY) -> bytes:
     return data.tobytes()
 
 
+def grey(image: Image) -> Image:
+    """The brightness of a picture, (height, width)."""
+    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.uint8, copy=False)
+
+
+def thumbnail(image: Image, width: int) -> bytes:
+    """The picture as a JPEG of that width."""
+    size = (width, max(1, round(image.shape[0] * width / image.shape[1])))
+    return encode(cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False))
+
+
 def upright(image: Image, *, flip: bool, mirror: bool, kind: Literal["ceiling", "shelf"]) -> Image:
     """The picture as somebody standing in the room would see it; `flip` and `mirror` are how it was delivered.
 

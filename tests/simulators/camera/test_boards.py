@@ -13,7 +13,11 @@ from services.vision.board import Board, find
 from services.vision.lens import Lens
 from tests.vision.boards import held, on_it
 
-HELD = [((0.5, 0.5), 0.6, (0, 0, 0)), ((0.75, 0.6), 0.6, (25, 10, 5)), ((0.2, 0.75), 0.9, (-20, -20, 0))]
+HELD = [
+    ("charuco", (0.5, 0.5), 0.6, (0, 0, 0)),
+    ("charuco", (0.2, 0.75), 0.9, (-20, -20, 0)),
+    ("chessboard", (0.75, 0.6), 0.6, (25, 10, 5)),
+]
 
 
 @pytest.fixture(scope="module")
@@ -21,8 +25,7 @@ def scene(world: World) -> Scene:
     return Scene(world, world.cameras["ip1"].lens, seed=1)
 
 
-@pytest.mark.parametrize("kind", ["charuco", "chessboard"])
-@pytest.mark.parametrize(("spot", "distance", "turned"), HELD)
+@pytest.mark.parametrize(("kind", "spot", "distance", "turned"), HELD)
 def test_its_corners_are_found_where_they_are(
     scene: Scene, world: World, kind: str, spot: tuple[float, float], distance: float, turned: tuple[float, ...]
 ) -> None:

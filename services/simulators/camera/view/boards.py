@@ -12,8 +12,8 @@ from services.simulators.camera.view.optics import Float32
 from services.simulators.camera.view.prints import INK, PAPER, Image, View, free, laid, plane, rows_and_columns
 from services.simulators.camera.view.solids import Box
 
-SQUARE_PX = 64  # of a square in its own picture
-FINE = 4  # looks per pixel, each way
+SQUARE_PX = (64, 32, 16, 8)  # of a square in its own picture: the one is taken that is about as fine as the looks
+FINE = 2  # looks per pixel, each way
 
 
 def draw(image: Image, board: HeldBoard, view: View, boxes: list[Box]) -> None:
@@ -27,15 +27,18 @@ def draw(image: Image, board: HeldBoard, view: View, boxes: list[Box]) -> None:
 
 
 @lru_cache(maxsize=4)
-def _print(kind: str, columns: int, rows: int, square: float, marker: float, dictionary: str) -> Float32:
-    """Greys of the squares, SQUARE_PX each."""
+def _print(kind: str, columns: int, rows: int, square: float, marker: float, dictionary: str) -> list[Float32]:
+    """Greys of the squares, in each of the sizes."""
+    finest = SQUARE_PX[0]
     if kind == "charuco":
         book = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
         made = cv2.aruco.CharucoBoard((columns, rows), square, marker, book)
-        ink = made.generateImage((columns * SQUARE_PX, rows * SQUARE_PX))
+        ink = made.generateImage((columns * finest, rows * finest))
     else:
-        ink = np.kron(np.indices((rows, columns)).sum(axis=0) % 2 * 255, np.ones((SQUARE_PX, SQUARE_PX)))
-    return np.where(np.asarray(ink) > 127, PAPER, INK).astype(np.float32)
+        ink = np.kron(np.indices((rows, columns)).sum(axis=0) % 2 * 255, np.ones((finest, finest)))
+    greys = np.where(np.asarray(ink) > 127, PAPER, INK).astype(np.float32)
+    sizes = [(columns * size, rows * size) for size in SQUARE_PX]
+    return [np.asarray(cv2.resize(greys, size, interpolation=cv2.INTER_AREA), np.float32) for size in sizes]
 
 
 def _averaged(board: HeldBoard, view: View, rays: Float32) -> tuple[Float32, Float32]:
@@ -43,9 +46,14 @@ def _averaged(board: HeldBoard, view: View, rays: Float32) -> tuple[Float32, Flo
     height, width = rays.shape[:2]
     dense = np.asarray(cv2.resize(rays, (width * FINE, height * FINE), interpolation=cv2.INTER_LINEAR), np.float32)
     x, y = np.moveaxis(plane(board.pose, view, dense) / board.square, -1, 0)
-    ink = _print(board.kind, board.columns, board.rows, board.square, board.marker, board.dictionary)
-    across, down = ((x + board.columns / 2) * SQUARE_PX - 0.5, (board.rows / 2 - y) * SQUARE_PX - 0.5)
-    grey = cv2.remap(ink, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=(PAPER,))
+    step = float(np.median(np.hypot(np.diff(x[::FINE], axis=1), np.diff(y[::FINE], axis=1))))  # squares between looks
+    level = min(range(len(SQUARE_PX)), key=lambda i: abs(SQUARE_PX[i] * step - 1))
+    side = SQUARE_PX[level]
+    prints = _print(board.kind, board.columns, board.rows, board.square, board.marker, board.dictionary)
+    across, down = ((x + board.columns / 2) * side - 0.5, (board.rows / 2 - y) * side - 0.5)
+    grey = cv2.remap(
+        prints[level], across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=(PAPER,)
+    )
     rim = board.margin / board.square
     on = (np.abs(x) < board.columns / 2 + rim) & (np.abs(y) < board.rows / 2 + rim)
     cover = cv2.resize(on.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)

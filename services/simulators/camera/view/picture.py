@@ -79,14 +79,14 @@ class Pictures:
     def frame(self, stream: Stream, now: float) -> Image:
         """The picture of this moment (BGR), made anew."""
         with self._lock:
-            return self._developed(stream, *self._motors(now), self._exposure(now))
+            return self._developed(stream, *self._motors(now), self.light(now))
 
     def jpeg(self, stream: Stream, now: float) -> bytes:
         """The picture of this moment, encoded."""
         with self._lock:
             pose, rates = self._motors(now)
             moved = self._scene.changes
-            key = (pose, self._tables.changes, self._exposure(now), int(now * self.fps(stream)), moved)
+            key = (pose, self._tables.changes, self.light(now), int(now * self.fps(stream)), moved)
             if stream not in self._newest or self._newest[stream][0] != key:
                 self._newest[stream] = key, _encoded(self._developed(stream, pose, rates, key[2]))
             return self._newest[stream][1]
@@ -96,7 +96,7 @@ class Pictures:
         with self._lock:
             self._scene.hold(name, board)
 
-    def _exposure(self, now: float) -> float:
+    def light(self, now: float) -> float:
         """How much light it has found: a change of mode starts in the dark, and settles in SETTLING_S."""
         since = now - self._tables.exposed_at
         return 1.0 if not 0.0 <= since < SETTLING_S else DARK + (1.0 - DARK) * since / SETTLING_S

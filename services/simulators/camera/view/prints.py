@@ -119,6 +119,8 @@ def _averaged(marker: Marker, view: View, rays: Float32) -> tuple[Float32, Float
 
 def free(pose: Transform, view: View, rays: Float32, boxes: list[Box]) -> NDArray[np.bool_]:
     """For every pixel of a patch, whether nothing stands between the camera and the sheet."""
+    if not boxes:
+        return np.ones(rays.shape[:2], np.bool_)
     flat = plane(pose, view, rays).reshape(-1, 2)
     points = pose.apply(np.column_stack([flat, np.full(len(flat), LIFT_M)]))
     hidden = np.zeros(len(points), bool)
