@@ -17,7 +17,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, stored, topics
 from services.bus import Message
-from services.command_line import mission, openhab
+from services.command_line import mission, openhab, zoom
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -199,6 +199,9 @@ def ptz(
 
     if not command.run(out, camera, apartment.state, ordered, yes_move=yes_move):
         raise typer.Exit(1)
+
+
+calibrate.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom.zoom)
 
 
 def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:
