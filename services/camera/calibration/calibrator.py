@@ -119,7 +119,7 @@ class Calibrator:
         found = yield from touring.plan(now)
         known, stops, name = touring.known, touring.stops, self.config.name
         page, _ = yield from study(lambda: mount_page.page(name, known, found, stops))
-        self.scanner.eye = replace(self.scanner.eye, mount=found.mount)
+        self.scanner.eye = replace(self.scanner.eye, mount=found.mount, mount_doubt=found.covariance[:6, :6])
         wrong = [str(marker) for marker, one in found.markers.items() if one.misplaced]
         return Calibration(
             what="mount",
