@@ -9,7 +9,7 @@ from typing import cast
 
 from services.camera.plan import Plan, wait
 from services.camera.ptz import drive as own
-from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.course import PAN, TILT
 from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.homing import Homing
 from services.camera.ptz.leg import DANGER, Leg, choose
