@@ -25,7 +25,7 @@ from tests import trials
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
 from tests.small_flat import SmallFlat, small_flat
-from tests.vision import positions
+from tests.vision import mount_trials, positions
 
 LONGEST_S = 600.0
 HANGING = ("a", "b", "c", "d")
@@ -125,6 +125,7 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "bridge": (bridge, 30, "s until all flows again"),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
+    "calibration": (mount_trials.calibrations, 150, "mm off, of the mount"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 

@@ -54,6 +54,7 @@ class Touring:
     limits: Limits
     skill: Skill
     settle_s: float
+    angle_deg: float
     tell: Callable[[Touring], None]
     said: str = ""
     progress: float = 0.0
@@ -79,7 +80,7 @@ class Touring:
             now = yield from self._stop_at(pan + right, tilt + below, now)
         self._say("that is enough, it is reckoned", 0.9)
         looks, known, guess = tuple(self.looks), self.known, self.guess
-        found, now = yield from study(lambda: fit(looks, known, guess))
+        found, now = yield from study(lambda: fit(looks, known, guess, self.angle_deg))
         self._check(found)
         yield from self._go(began.pan, began.tilt, now)
         return found

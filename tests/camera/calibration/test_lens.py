@@ -15,6 +15,7 @@ from services.camera.service import CameraService
 from services.virtual import VirtualApartment
 from services.vision.board import Board
 from services.vision.lens import Lens
+from tests import bounds
 from tests.camera.calibration.showing import ordered, person, true_lens, world_of
 from tests.trials import virtual_flat
 from tests.vision.lens_trials import reprojection
@@ -45,7 +46,7 @@ def test_a_board_that_is_shown_gives_the_true_lens(flat: VirtualApartment, tmp_p
     end, told = ordered(flat, "CalibrateLens", "True", person(flat, Board(), np.random.default_rng(1)))
     assert (end.state, end.error) == ("done", None)
     found = Lens.from_camera_info(document.must(document.read(file)))
-    assert np.diag(found.matrix)[:2] == pytest.approx(np.diag(truth.matrix)[:2], rel=0.005)
+    assert np.diag(found.matrix)[:2] == pytest.approx(np.diag(truth.matrix)[:2], rel=bounds.LENS)
     assert found.matrix[:2, 2] == pytest.approx(truth.matrix[:2, 2], abs=5.0)
     assert reprojection(found, truth) < 2.0
     assert in_use(flat).matrix == pytest.approx(found.matrix, abs=1e-4)
