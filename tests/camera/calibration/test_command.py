@@ -72,6 +72,17 @@ def test_the_mount_is_written_and_the_old_file_kept(tmp_path: Path) -> None:
     assert backup.read_bytes() == old
 
 
+def test_a_configuration_that_others_may_not_read_stays_so_and_its_copy_too(tmp_path: Path) -> None:
+    real = Path(shutil.copy(CONFIG / "simulated.yaml", tmp_path / "real.yaml"))
+    real.chmod(0o600)
+    link = tmp_path / "apartment.yaml"
+    link.symlink_to(real)
+    calibrate.write_mount(link, "ip1", FOUND)
+    assert link.is_symlink()
+    assert yaml.safe_load(real.read_text(encoding="utf-8"))["cameras"]["ip1"]["mount"] == FOUND
+    assert {file.stat().st_mode & 0o777 for file in tmp_path.iterdir()} == {0o600}
+
+
 def test_a_configuration_that_does_not_lend_itself_stays_and_the_mount_is_told(tmp_path: Path) -> None:
     file = tmp_path / "apartment.yaml"
     file.write_text("cameras: {ip1: {url: x}}\n", encoding="utf-8")
