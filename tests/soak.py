@@ -24,6 +24,7 @@ from services.virtual import VirtualApartment
 from tests import trials
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
+from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
 from tests.vision import mount_trials, positions
 
@@ -87,6 +88,20 @@ def bridge() -> Iterator[Turn]:
         yield traffic.turn
 
 
+@contextmanager
+def writer(trial: Callable[[writer_trials.Site, random.Random], float]) -> Iterator[Turn]:
+    """Turns with the writer, its broker and its database alone."""
+    with tempfile.TemporaryDirectory() as name, writer_trials.site(Path(name)) as one:
+        yield lambda rng: trial(one, rng)
+
+
+def lost_by_the_broker(one: writer_trials.Site, rng: random.Random, *, backlog: bool) -> float:
+    """kill -9 of mosquitto: percent of the acknowledged messages that it lost. How many it doubled is printed."""
+    acknowledged, lost, doubled = writer_trials.kill_broker(one, rng, backlog=backlog)
+    Console().print(f"mosquitto killed: {acknowledged} acknowledged, {lost} lost, {doubled} doubled")
+    return 100.0 * lost / acknowledged
+
+
 PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "kills": (lambda: real(lambda flat, rng: trials.kill(flat, rng.choice(trials.BUS_SERVICES))), 40, "s until online"),
     "camera": (lambda: real(lambda flat, rng: trials.kill_camera(flat)), 10, "s until an order is done"),
@@ -123,6 +138,9 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
         "s until it shows",
     ),
     "bridge": (bridge, 30, "s until all flows again"),
+    "persistence": (lambda: writer(writer_trials.trouble), 100, "messages, none lost or doubled"),
+    "broker-kills": (lambda: writer(lambda one, rng: lost_by_the_broker(one, rng, backlog=False)), 10, "% lost"),
+    "broker-kills-backlog": (lambda: writer(lambda one, rng: lost_by_the_broker(one, rng, backlog=True)), 10, "% lost"),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
     "calibration": (mount_trials.calibrations, 150, "mm off, of the mount"),

@@ -24,8 +24,9 @@ def text(site: Site) -> str:
 def _lines(site: Site) -> Iterator[str]:
     by_strategies: dict[tuple[str, ...], list[str]] = {}
     for item_name, item in site.home.items.items():
-        if item.persist:
-            by_strategies.setdefault(tuple(item.persist), []).append(name(item_name, PERSIST_WORDS))
+        known = tuple(one for one in item.persist if one in BUILT_IN)
+        if known:
+            by_strategies.setdefault(known, []).append(name(item_name, PERSIST_WORDS))
     for strategies, names in by_strategies.items():
         yield f"{_wrapped(names)} : strategy = {', '.join(strategies)}"
 

@@ -16,8 +16,10 @@ from zlib import crc32
 from services.bus import Message
 from services.storage import SeenTurn
 
-REMEMBERED = 2000  # packets; the broker sends 1000 at most before it wants an acknowledgement (its window)
-SLOTS = 2048  # turns that are stored, one row each, the oldest overwritten: enough when each has but one message
+# All packet ids that there are. The broker's window (1000) would do if it kept it: while messages are queued behind the
+# window mosquitto 2.0.11 lets several new ones out for one acknowledgement; 7000 were seen under way at once.
+REMEMBERED = 65_535
+SLOTS = 65_536  # turns that are stored, one row each, the oldest overwritten: enough when each has but one message
 PAIR = struct.Struct("<HI")
 
 
@@ -29,6 +31,11 @@ class Seen:
         self._known: dict[int, int] = {}  # packet id to checksum, oldest first
         self._fresh: deque[tuple[int, int]] = deque(maxlen=REMEMBERED)  # not committed yet
         self._turn = 0
+
+    @property
+    def any(self) -> bool:
+        """Whether there ever was one, so that the broker must know us."""
+        return bool(self._known)
 
     def learn(self, turns: Iterable[SeenTurn]) -> None:
         """What the database remembers."""

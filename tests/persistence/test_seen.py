@@ -42,19 +42,22 @@ def test_only_the_same_packet_sent_again_is_a_second_one(message: Message, is_se
     assert after_a_crash(seen).is_second(message) is is_second
 
 
-def test_a_window_of_packets_is_remembered_and_no_more() -> None:
+def test_as_many_packets_are_remembered_as_there_are_ids() -> None:
     seen, turns = Seen("persistence"), []
-    for number in range(1, REMEMBERED + 500):
-        seen.is_second(packet(number))
-        kept = seen.turn()
-        assert kept is not None
-        turns.append(kept)
-        seen.committed()
-    assert len({kept.slot for kept in turns[-SLOTS:]}) == len(turns[-SLOTS:])
+    for number in range(REMEMBERED + 500):
+        seen.is_second(packet(number % 65_535 + 1, str(number)))
+        if number % 100 == 0 or number > REMEMBERED:
+            kept = seen.turn()
+            assert kept is not None
+            turns.append(kept)
+            seen.committed()
+    assert len({kept.slot for kept in turns}) == len(turns) < SLOTS
     fresh = Seen("persistence")
     fresh.learn(reversed(turns))
-    assert not fresh.is_second(packet(1, again=True))
-    assert all(fresh.is_second(packet(number, again=True)) for number in range(600, REMEMBERED + 500))
+    assert not fresh.is_second(packet(1, "0", again=True))
+    newest = range(REMEMBERED + 1, REMEMBERED + 500)
+    assert all(fresh.is_second(packet(number % 65_535 + 1, str(number), again=True)) for number in newest)
+    assert fresh.is_second(packet(1000, "999", again=True))
 
 
 def test_packets_of_turns_without_rows_are_kept_with_the_next() -> None:
