@@ -32,6 +32,13 @@ def flat(tmp_path: Path) -> Iterator[VirtualApartment]:
         yield flat
 
 
+@pytest.fixture(scope="module")
+def untouched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualApartment]:
+    """One for all orders that are refused."""
+    with virtual_flat(tmp_path_factory.mktemp("untouched")) as flat:
+        yield flat
+
+
 def in_use(flat: VirtualApartment) -> Lens:
     """The lens that the running service reckons with."""
     service = next(runner.service for runner in flat.runners if isinstance(runner.service, CameraService))
@@ -107,7 +114,9 @@ def test_a_lens_that_ros_has_calibrated_is_written_as_ros_reads_it_and_used(
         ("CalibrateMount", {"markers": {"582": [1, 2]}}, "markers.582"),
     ],
 )
-def test_what_cannot_be_is_refused_with_the_reason(flat: VirtualApartment, key: str, value: object, why: str) -> None:
-    end, _ = ordered(flat, key, json.dumps({"value": value}))
+def test_what_cannot_be_is_refused_with_the_reason(
+    untouched: VirtualApartment, key: str, value: object, why: str
+) -> None:
+    end, _ = ordered(untouched, key, json.dumps({"value": value}))
     assert end.state == "refused"
     assert why in (end.error or "")

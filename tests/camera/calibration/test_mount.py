@@ -69,7 +69,7 @@ def test_without_markers_there_is_no_mount(
     flat: VirtualApartment, markers: dict[str, list[float]], state: str, why: str
 ) -> None:
     def stops_the_search(told: object) -> None:
-        if getattr(told, "views", 0) >= 2:
+        if getattr(told, "views", 0) >= 1:
             flat.client.say("camera/ip1/order/Move", "Stop")
 
     old = in_use(flat)
