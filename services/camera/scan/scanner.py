@@ -192,6 +192,8 @@ class Scanner:
             dictionary=self.config.dictionary,
             targets=scan.findings.targets,
             draw=self.show,
+            still=id(frame.spot),
+            of=frame.spot.wanted,
         )
         self._looking.submit(task)
 
