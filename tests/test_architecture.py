@@ -77,6 +77,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.command_line": ("services",),
     "services.virtual": ("services",),
     "services.demo": ("services",),
+    "services.scanned": ("services",),
     "services.pytest_plugin": ("services",),
     "services.__main__": ("services",),
 }
