@@ -156,7 +156,7 @@ PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
     "services.bus", "services.vision.", *(f"services.camera.ptz.{part}" for part in MOVING),
     "services.camera.scan.search", "services.camera.scan.route", "services.camera.scan.footage",
-    "services.camera.scan.source", "services.camera.scan.findings",
+    "services.camera.scan.source", "services.camera.scan.findings", "services.camera.calibration.zoom",
     "services.camera.video.timing",
     "services.camera.brands.dahua.", "services.camera.alarm.motion", "services.camera.sound.g711",
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",

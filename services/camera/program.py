@@ -75,5 +75,5 @@ def eye(config: Config) -> Eye:
             raise ConfigError([f"{file}:1: {error}"]) from error
     mount = config.mount.mount() if config.mount else None
     zoom = levels.read(levels.of_lens(config.folder / config.camera_info)) if config.camera_info is not None else ()
-    noise = config.reading_noise_deg
-    return Eye(config.name, config.dictionary, lens, mount, config.zoom_range[0], zoom, angle_noise_deg=noise)
+    widest, noise, doubt = config.zoom_range[0], config.reading_noise_deg, config.mount_doubt
+    return Eye(config.name, config.dictionary, lens, mount, widest, zoom, angle_noise_deg=noise, mount_doubt=doubt)
