@@ -97,6 +97,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.camera.web.",
         "services.camera.probe.",
         "services.openhab.rest",
+        "services.openhab.live",
     ),
     "cv2": (
         "services.vision.",
