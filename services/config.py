@@ -27,7 +27,7 @@ from services.topic import LEVELS
 
 M = TypeVar("M", bound=BaseModel)
 TOP = ("bus", "state", "home", "default_camera", "grouped")
-INJECTED = ("name", "home", "cameras", "folder", "state")  # see `section.py`
+INJECTED = ("name", "home", "cameras", "camera_sections", "folder", "state")  # see `section.py`
 
 
 class Tls(Section):
@@ -114,6 +114,7 @@ def load(
     cameras = _cameras(raw, source)
     state = _state_folder(top or Top(home=file), file, environment)
     given = {"home": home, "cameras": cameras, "folder": file.parent, "state": state}
+    given["camera_sections"] = raw.get("cameras") if cameras else None
     _unknown_sections(raw, source)
     _misnamed_cameras(raw, source)
     instances = {one.name: one for one in _instances(raw, source, cameras, given)}

@@ -19,6 +19,7 @@ from services.states import ITEM_TYPES, base_type
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 NOT_A_NAME = "expected a name of letters, digits and _ that does not begin with a digit"
 GROUP_ROS = "ROS"  # the group whose members go to the robot, as in the report
+Value = bool | int | float | str  # of a setting in OpenHAB's files
 
 
 class Range(Section):
@@ -35,10 +36,34 @@ class Range(Section):
         return self
 
 
+class Alexa(Section):
+    """That Alexa may use it. What is not said follows from the item: `alexa: {}` is enough."""
+
+    name: str | None = None  # what people call it; None: its label
+    device: str | None = None  # the skill's words, such as `Light` or `Thermostat.TargetTemperature`
+    settings: dict[str, Value] = Field(default={})  # parameters of the skill
+
+
+class Metadata(Section):
+    """Any other metadata of OpenHAB, as it is there: a value, and settings."""
+
+    value: str = ""
+    settings: dict[str, Value] = Field(default={})
+
+
 class Room(Section):
     """A room; its walls are in `world.yaml`, its name here is what people read."""
 
     label: str
+    tag: str | None = None  # the class in OpenHAB's semantic model, such as LivingRoom; None: Room
+
+
+class MqttDevice(Section):
+    """Where a plain MQTT device says that it is there, and in which words; OpenHAB's own are ON and OFF."""
+
+    availability: str
+    online: str = "ON"
+    offline: str = "OFF"
 
 
 class Thing(Section):
@@ -47,6 +72,34 @@ class Thing(Section):
     label: str
     room: str | None = None
     kind: Literal["zwave", "mqtt", "virtual"] = "zwave"
+    tag: str | None = None  # the class in OpenHAB's semantic model, such as Lightbulb; None: Equipment
+    alexa: Alexa | None = None  # one device for Alexa, of all its items that she may use
+    mqtt: MqttDevice | None = None
+
+
+class Group(Section):
+    """A group of OpenHAB; with a type it has a state, of its members by `function` (such as OR of ON and OFF)."""
+
+    label: str
+    type: str | None = None
+    function: str | None = None
+    arguments: tuple[str, ...] = ()
+    groups: tuple[str, ...] = ()
+    icon: str | None = None
+    tags: tuple[str, ...] = ()
+    metadata: dict[str, Metadata] = Field(default={})
+
+
+class MqttTopics(Section):
+    """The topics of an item whose thing is a plain MQTT device, and how its payloads read."""
+
+    state: str | None = None
+    command: str | None = None  # None: it takes no commands
+    transform: str | None = None  # such as `JSONPATH:$.t`; of what comes
+    transform_out: str | None = None  # of commands
+    on: str | None = None  # the device's words for ON or OPEN or UP, and the others
+    off: str | None = None
+    stop: str | None = None
 
 
 class Item(Section):
@@ -68,6 +121,13 @@ class Item(Section):
     autoupdate: bool = True  # OpenHAB takes a command for the new state at once; else only the device's report counts
     ros: bool = True  # member of group ROS: on the robot's topics
     persist: tuple[str, ...] = ("everyChange", "restoreOnStartup")  # empty: never stored
+    channels: dict[str, dict[str, Value]] = Field(default={})  # OpenHAB's channels, each with settings such as profile
+    mqtt: MqttTopics | None = None
+    alexa: Alexa | None = None  # None: not for Alexa
+    ga: str | None = None  # Google Assistant's device type
+    expire: str | None = None  # such as `15m,UNDEF`: what OpenHAB makes of a state that nobody renews
+    tags: tuple[str, ...] | None = None  # of OpenHAB's semantic model; None: what follows from the item
+    metadata: dict[str, Metadata] = Field(default={})
 
     @field_validator("type")
     @classmethod
@@ -88,7 +148,7 @@ class Home(Section):
     timezone: str = "UTC"  # of the IANA database, such as Europe/Madrid: the clock on the wall
     rooms: dict[str, Room] = Field(default={})
     things: dict[str, Thing] = Field(default={})
-    groups: dict[str, str] = Field(default={})  # name -> label
+    groups: dict[str, str | Group] = Field(default={})  # name -> label, or more
     items: dict[str, Item]
 
     @field_validator("timezone")
@@ -110,9 +170,12 @@ class Home(Section):
         for name, thing in self.things.items():
             if thing.room is not None and thing.room not in self.rooms:
                 yield ("things", name, "room"), f"expected one of the rooms, got {thing.room!r}"
-        for name in self.groups:
+        for name, group in self.groups.items():
             if not re.fullmatch(NAME, name):
                 yield ("groups", name), NOT_A_NAME
+            for parent in group.groups if isinstance(group, Group) else ():
+                if parent not in self.groups and parent != GROUP_ROS:
+                    yield ("groups", name, "groups"), f"expected one of the groups, got {parent!r}"
         for name, item in self.items.items():
             yield from self._item_faults(name, item)
 
@@ -133,6 +196,19 @@ class Home(Section):
     def ros_items(self) -> dict[str, Item]:
         """The members of group ROS."""
         return {name: item for name, item in self.items.items() if item.ros}
+
+    def named(self, words: str) -> list[str] | None:
+        """The items that `Name`, `Group*` (its members) or `*` (all) means; None when the home has no such one."""
+        if words == "*":
+            return list(self.items)
+        if not words.endswith("*"):
+            return [words] if words in self.items else None
+        group = words[:-1]
+        if group == GROUP_ROS:
+            return list(self.ros_items)
+        if group not in self.groups:
+            return None
+        return [name for name, item in self.items.items() if group in item.groups]
 
     def room_of(self, name: str) -> str | None:
         """The room of an item: its own, else its thing's."""

@@ -1,4 +1,4 @@
-"""The payloads that travel as JSON: one frozen model each. Which topic carries which is in `topics.py`.
+"""The payloads that travel as JSON: one frozen model each. Which topic carries which is in `topics/`.
 
 Times are ISO 8601 in UTC with milliseconds and `Z`; angles are degrees as the camera reads them; lengths metres.
 """
@@ -228,9 +228,61 @@ class ScanResult(Payload):
         return text
 
 
+class Calibration(Payload):
+    """`camera/<cam>/calibration`: how far it is, what to show next, and at its end what came out.
+
+    `regions`: whether the board was shown there, rows from the top. `values`: each number with its standard deviation,
+    of a zoom the focal length of each level in pixels; of a mount also `mount`, as the configuration writes it.
+    `report` is a page with pictures, where the service runs.
+    """
+
+    what: Literal["lens", "mount", "zoom"]
+    state: Literal["running", "done", "failed", "cancelled"]
+    progress: float = Field(default=0.0, ge=0.0, le=1.0)
+    views: int = 0
+    said: str = ""
+    regions: list[list[bool]] = []
+    values: dict[str, tuple[float, float]] = {}
+    mount: dict[str, Free] | None = None
+    file: str | None = None
+    report: str | None = None
+
+
 class Stream(Payload):
     """`camera/<cam>/stream`: which streams are on, and where the picture can be had without a password."""
 
     rtsp: bool
     mjpeg: bool
     url: str
+
+
+class HistoryGet(Payload):
+    """`history/get`: a question. Times are ISO 8601 with an offset; no `until` is now, no `since` is from ever.
+
+    `what`: the newest `limit` `samples` of a span, or with `every` (seconds) one mean per bucket; the `last` sample
+    before `until`; the `changes` in a span, of all items when none is named; the `durations` of each state.
+    """
+
+    id: str = Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")
+    item: str | None = None
+    what: Literal["samples", "last", "changes", "durations"] = "samples"
+    since: str | None = None
+    until: str | None = None
+    limit: int | None = Field(default=None, ge=1)
+    every: float | None = Field(default=None, gt=0)
+
+
+class HistoryReply(Payload):
+    """`history/reply/<id>`: the answer; samples oldest first, `unit` that of their numbers.
+
+    `buckets` with `every`: begin, count, least, mean, greatest. `changes`: item, time, state. `durations`: seconds.
+    """
+
+    id: str
+    item: str | None
+    samples: list[tuple[str, float | str]]
+    unit: str | None = None
+    buckets: list[tuple[str, int, float, float, float]] | None = None
+    changes: list[tuple[str, str, float | str]] | None = None
+    durations: dict[str, float] | None = None
+    error: str | None = None

@@ -55,6 +55,14 @@ REGISTRY: tuple[Row, ...] = (
         plays="openhab",
     ),
     Row(
+        "simulated-robot",
+        "services.simulators.robot",
+        ("simulators", "robot"),
+        "a robot that drives, sees and fails",
+        group="light",
+        plays="robot",
+    ),
+    Row(
         "persistence",
         "services.persistence",
         ("persistence",),
@@ -63,6 +71,10 @@ REGISTRY: tuple[Row, ...] = (
         durable=True,
         protocol=4,
     ),
+    Row("history", "services.history", ("history",), "answers what was, and clears what is old"),
     Row("camera-<cam>", "services.camera", ("cameras", "<cam>"), "drives one camera: places, orders, scans"),
     Row("bridge", "services.bridge", ("bridge",), "maps the bus to ROS 1 topics and back", group="light"),
+    Row("openhab", "services.openhab", ("openhab",), "mirrors an OpenHAB that has no MQTT binding", group="light"),
+    Row("hubs", "services.hubs", ("hubs",), "tells Home Assistant and Homie what there is", group="light"),
+    Row("mission", "services.mission", ("mission",), "robot and house find a marker together", group="light"),
 )

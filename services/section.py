@@ -10,7 +10,8 @@ class Section(BaseModel):
 
     A Config may name these fields, which do not stand in its section but are given to it by `config.py`:
     `name` (of the service or camera), `home` (the home's model), `cameras` (their names, the default one first),
-    `folder` (of the configuration file: what its relative paths start from), `state` (the folder for what is kept).
+    `camera_sections` (their sections as they stand there, for who needs to know how a camera hangs), `folder` (of the
+    configuration file: what its relative paths start from), `state` (the folder for what is kept).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -1,6 +1,6 @@
 """What a row of the table of topics is: pattern, kind, payload, roles; and the messages that it makes.
 
-Not here: the rows, and reading what comes; that is `topics.py`.
+Not here: the rows, and reading what comes; that is `topics/`.
 """
 
 from __future__ import annotations
@@ -34,8 +34,13 @@ LEVELS = {
     "service": r"[a-z0-9_-]+",
     "key": r"[A-Za-z]+",
     "marker": r"[0-9]{1,4}",
+    "id": r"[A-Za-z0-9_-]{1,64}",
     "platform": r"[a-z_]+",
     "entity": r"[a-z0-9_-]+",
+    "device": r"[a-z0-9][a-z0-9-]*",  # of Homie, as are the next three
+    "node": r"[a-z0-9][a-z0-9-]*",
+    "property": r"[a-z0-9][a-z0-9-]*",
+    "attribute": r"\$[a-z]+",
     "component": r"[A-Za-z0-9_-]+(?:/[A-Za-z0-9_-]+)*",
 }
 

@@ -12,7 +12,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +22,12 @@ from rich.table import Table
 from services.simulated import Simulated, parts_of, services_of
 from services.virtual import VirtualApartment
 from tests import trials
+from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
+from tests.camera.scan.scenes import scan_a_scene
+from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
+from tests.vision import mount_trials, positions
 
 LONGEST_S = 600.0
 HANGING = ("a", "b", "c", "d")
@@ -78,6 +82,27 @@ def scan(flat: VirtualApartment, rng: random.Random) -> float:
     return flat.now - began
 
 
+@contextmanager
+def bridge() -> Iterator[Turn]:
+    """Turns of a bridge under traffic both ways, one for all."""
+    with bridge_trials.under_traffic() as traffic:
+        yield traffic.turn
+
+
+@contextmanager
+def writer(trial: Callable[[writer_trials.Site, random.Random], float]) -> Iterator[Turn]:
+    """Turns with the writer, its broker and its database alone."""
+    with tempfile.TemporaryDirectory() as name, writer_trials.site(Path(name)) as one:
+        yield lambda rng: trial(one, rng)
+
+
+def lost_by_the_broker(one: writer_trials.Site, rng: random.Random, *, backlog: bool) -> float:
+    """kill -9 of mosquitto: percent of the acknowledged messages that it lost. How many it doubled is printed."""
+    acknowledged, lost, doubled = writer_trials.kill_broker(one, rng, backlog=backlog)
+    Console().print(f"mosquitto killed: {acknowledged} acknowledged, {lost} lost, {doubled} doubled")
+    return 100.0 * lost / acknowledged
+
+
 PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "kills": (lambda: real(lambda flat, rng: trials.kill(flat, rng.choice(trials.BUS_SERVICES))), 40, "s until online"),
     "camera": (lambda: real(lambda flat, rng: trials.kill_camera(flat)), 10, "s until an order is done"),
@@ -113,8 +138,15 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
         25,
         "s until it shows",
     ),
+    "bridge": (bridge, 30, "s until all flows again"),
+    "persistence": (lambda: writer(writer_trials.trouble), 100, "messages, none lost or doubled"),
+    "broker-kills": (lambda: writer(lambda one, rng: lost_by_the_broker(one, rng, backlog=False)), 10, "% lost"),
+    "broker-kills-backlog": (lambda: writer(lambda one, rng: lost_by_the_broker(one, rng, backlog=True)), 10, "% lost"),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
+    "calibration": (mount_trials.calibrations, 150, "mm off, of the mount"),
+    "scenes": (lambda: nullcontext(lambda rng: scan_a_scene(rng)), 24, "s, virtual"),
+    "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 
 

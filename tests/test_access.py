@@ -16,12 +16,13 @@ from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.client import Client
 from services.peers import mosquitto, program
+from services.topics import page
 
 ROOT = Path(__file__).parents[1]
 
 
 def test_the_written_files_equal_what_the_code_generates() -> None:
-    assert (ROOT / "bus_topics.md").read_text(encoding="utf-8") == topics.markdown()
+    assert (ROOT / "bus_topics.md").read_text(encoding="utf-8") == page.markdown()
     assert (ROOT / "mosquitto/acl").read_text(encoding="utf-8") == access.acl(["ip1"])
 
 

@@ -21,7 +21,15 @@ LONGEST_MODULE = 300
 
 # Who may import which of ours, besides its own package (`services.camera` its parts, a module itself).
 WORDS = ("services.errors", "services.section", "services.states")
-CORE = (*WORDS, "services.payloads", "services.bus", "services.topic", "services.topics", "services.home")
+CORE = (
+    *WORDS,
+    "services.payloads",
+    "services.bus",
+    "services.robot_payloads",
+    "services.topic",
+    "services.topics",
+    "services.home",
+)
 FILES_OF_OURS = ("services.document", "services.secret_store")  # reading YAML, finding secrets
 SHELL = ("services.config", "services.registry", "services.runner", "services.aside", "services.process")
 BUSES = ("services.bus.mqtt", "services.bus.memory", "services.bus.connection", "services.bus.outbox")
@@ -34,8 +42,11 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.payloads": ("services.errors",),
     "services.bus": ("services.errors",),
     "services.home": WORDS,
+    "services.robot_payloads": ("services.errors", "services.payloads"),
+    "services.floor": (*WORDS, "services.document"),
+    "services.robot_places": (*WORDS, "services.document", "services.floor"),
     "services.topic": (*WORDS, "services.bus", "services.payloads"),
-    "services.topics": (*WORDS, "services.bus", "services.payloads", "services.topic"),
+    "services.topics": (*WORDS, "services.bus", "services.payloads", "services.robot_payloads", "services.topic"),
     "services.bus.mqtt": (*CORE, "services.bus.connection", "services.bus.outbox"),
     "services.bus.memory": (*CORE, "services.bus.outbox"),
     "services.bus.connection": CORE,
@@ -50,20 +61,24 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
     "services.runner": (*CORE, "services.aside"),
     "services.camera": (*SERVICE, "services.vision"),
-    "services.bridge": (*SERVICE, "services.vision"),
+    "services.bridge": (*SERVICE, "services.vision", "services.floor"),
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage"),
     "services.openhab": SERVICE,
-    "services.mission": SERVICE,
+    "services.hubs": SERVICE,
+    "services.mission": (*SERVICE, "services.floor", "services.robot_places"),
     "services.dashboard": SERVICE,
-    "services.simulators": (*SERVICE, "services.vision"),
+    "services.simulators": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
     "services.process": (*CORE, *BUSES, *SHELL),
     "services.supervisor": ("services.process", "services.config"),
     "services.client": (*CORE, *BUSES, *SHELL),
     "services.peers": (*CORE, "services.access"),
     "services.simulated": (*CORE, *SHELL, "services.client", "services.peers", "services.supervisor"),
+    "services.stored": ("services",),
+    "services.command_line": ("services",),
     "services.virtual": ("services",),
     "services.demo": ("services",),
+    "services.scanned": ("services",),
     "services.pytest_plugin": ("services",),
     "services.__main__": ("services",),
 }
@@ -83,20 +98,30 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.camera.web.",
         "services.camera.probe.",
         "services.openhab.rest",
+        "services.openhab.live",
     ),
     "cv2": (
         "services.vision.",
         "services.camera.video.",
         "services.bridge.images",
+        "services.floor",
         "services.simulators.camera.",
     ),
     "av": ("services.camera.video.rtsp",),
     "gi": ("services.simulators.camera.rtsp.",),
     "pymysql": ("services.storage.mysql",),
     "sqlite3": ("services.storage.sqlite",),
+    "croniter": ("services.persistence.cron",),
     "yaml": ("services.document",),
-    "typer": ("services.__main__",),
-    "rich": ("services.__main__", "services.camera.ptz.command", "services.demo", "services.camera.probe."),
+    "lark": ("services.openhab.check.",),
+    "typer": ("services.__main__", "services.stored", "services.command_line."),
+    "rich": (
+        "services.__main__",
+        "services.command_line.",
+        "services.camera.ptz.command",
+        "services.demo",
+        "services.camera.probe.",
+    ),
     "starlette": ("services.dashboard.http",),
     "uvicorn": ("services.dashboard.http",),
     "pytest": ("services.pytest_plugin",),
@@ -121,17 +146,34 @@ MOVING = (
     "turning",
     "zooming",
 )
+OPENHAB_PURE = tuple(
+    f"services.openhab.{part}"
+    for part in (
+        "check.", "versions", "words", "lines", "semantics", "skill", "alexa", "site", "cameras", "state_description",
+        "readback",
+        "items", "mqtt", "things", "sitemap", "persist", "reactions", "dsl", "javascript", "widgets", "generate",
+        "importing",
+    )
+)  # fmt: skip
 PURE = (
     "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
     "services.bus", "services.vision.", *(f"services.camera.ptz.{part}" for part in MOVING),
-    "services.camera.scan.search",
+    "services.camera.scan.search", "services.camera.scan.route", "services.camera.scan.footage",
+    "services.camera.scan.source", "services.camera.scan.findings", "services.camera.calibration.zoom",
     "services.camera.video.timing",
     "services.camera.brands.dahua.", "services.camera.alarm.motion", "services.camera.sound.g711",
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
     "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
-    "services.camera.discovery", "services.bridge.rules",
-    "services.persistence.rows", "services.persistence.strategies", "services.openhab.generate",
-    "services.dashboard.view", "services.mission.plan", "services.simulators.agenda", "services.simulators.climate",
+    "services.camera.discovery", "services.bridge.rules", "services.bridge.frames", "services.bridge.multipart",
+    "services.bridge.confirm", "services.bridge.pace", "services.bridge.items", "services.bridge.template",
+    "services.persistence.rows", "services.persistence.seen", "services.persistence.strategies",
+    "services.persistence.cron", "services.persistence.filters", "services.persistence.decisions",
+    "services.history.answers", "services.history.plot", "services.storage.reading", *OPENHAB_PURE,
+    "services.hubs.homeassistant", "services.hubs.homie",
+    "services.dashboard.view", "services.mission.plan", "services.mission.state", "services.mission.events",
+    "services.mission.moment", "services.mission.standing", "services.mission.memory", "services.mission.telling",
+    "services.simulators.agenda", "services.simulators.climate", "services.simulators.robot.route",
+    "services.simulators.robot.plan", "services.simulators.robot.sight", "services.simulators.robot.body",
     "services.simulators.devices", "services.simulators.life",
 )  # fmt: skip
 IMPURE = (
@@ -139,7 +181,7 @@ IMPURE = (
     "threading", "time", "urllib",
 )  # fmt: skip
 
-PRINTS = ("services.__main__",)
+PRINTS = ("services.__main__", "services.stored")
 CATCHES_ALL = ("services.supervisor",)
 VALIDATORS = (
     "field_validator",

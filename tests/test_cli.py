@@ -60,7 +60,12 @@ def apart(tmp_path: Path) -> Iterator[tuple[Path, dict[str, str]]]:
 def test_run_is_ready_when_everything_answers_and_ends_cleanly(apart: tuple[Path, dict[str, str]]) -> None:
     config, environment = apart
     with command(["run", "--config", str(config)], environment) as (process, ready):
-        assert set(ready["services"]) == {"simulated-camera", "simulated-home+persistence+bridge", "camera-ip1"}
+        assert set(ready["services"]) == {
+            "simulated-camera",
+            "simulated-home+simulated-robot+persistence+bridge+mission",
+            "history",
+            "camera-ip1",
+        }
         with connected(BusSettings(port=ready["broker"]["port"]), ["service/+/status"]) as bus:
             for name in ("simulated-home", "persistence", "bridge", "camera-ip1"):
                 assert bus.payload(f"service/{name}/status") == "online"

@@ -12,7 +12,7 @@ import re
 import shutil
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -25,10 +25,15 @@ BUS_SERVICES = ("camera-ip1", "bridge", "persistence", "simulated-home")
 
 
 @contextmanager
-def virtual_flat(folder: Path) -> Iterator[VirtualApartment]:
-    """The simulated apartment in virtual time, on a copy of its configuration and a database of its own."""
+def virtual_flat(folder: Path, change: Callable[[Path], None] = lambda _: None) -> Iterator[VirtualApartment]:
+    """The simulated apartment in virtual time, on a copy of its configuration and a database of its own.
+
+    `change` is given the copy before anything reads it.
+    """
     config = Path(shutil.copytree(CONFIG, folder / "config")) / "simulated.yaml"
+    change(config)
     own = {"APARTMENT_DATABASE": f"sqlite:///{folder}/bus.db", "APARTMENT_WITHOUT_ROS": "true"}
+    own["APARTMENT_STATE"] = str(folder / "state")
     with VirtualApartment(config, own) as flat:
         yield flat
 

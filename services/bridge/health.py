@@ -42,18 +42,18 @@ class Health:
         level, text = OK, f"ROS: {self.link.text}"
         if now - self._refused[0] < WARN_FOR_S:
             level, text = WARN, f"refused: {self._refused[1]}"
+        elif self.link.advice:
+            level, text = WARN, self.link.advice
         if not self.link.up:
             level, text = ERROR, f"no ROS master: {self.link.text}"
         values = {"ros_up": str(self.link.up), "registrations": str(self.link.registrations)}
         values |= {name: str(count) for name, count in counters.items()}
         return Diagnostic(level=level, message=text[:400], values=values, hardware_id="bridge")
 
-    def array(self, now: float) -> Fields:
-        """A DiagnosticArray; what has been silent for a while is stale."""
-        return {
-            "header": {"stamp": now},
-            "status": [_status(component, news, now) for component, news in sorted(self._news.items())],
-        }
+    def array(self, now: float, more: list[Fields]) -> Fields:
+        """A DiagnosticArray, with `more` statuses of the parts; what has been silent for a while is stale."""
+        heard = [_status(component, news, now) for component, news in sorted(self._news.items())]
+        return {"header": {"stamp": now}, "status": [*heard, *more]}
 
 
 def _status(component: str, news: News, now: float) -> Fields:

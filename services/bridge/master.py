@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import http.client
 import xmlrpc.client
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 from xml.parsers.expat import ExpatError
@@ -55,6 +55,7 @@ class Registrations:
     publications: Iterable[tuple[str, str]] = field(default=())
     subscriptions: Iterable[tuple[str, str]] = field(default=())
     services: Iterable[tuple[str, str]] = field(default=())
+    parameters: Mapping[str, Any] = field(default_factory=dict)  # by their full names
 
 
 def register(master: Master, node: Registrations) -> None:
@@ -69,6 +70,23 @@ def register(master: Master, node: Registrations) -> None:
         _call(node.uri, "publisherUpdate", master.caller, topic, publishers)
     for name, address in node.services:
         master.call("registerService", name, address, node.uri)
+    for name, value in node.parameters.items():
+        master.call("setParam", name, value)
+
+
+def rival(master: Master, own: str) -> str:
+    """The address of another node alive with our name; empty when there is none. `own`: our address, if we have one.
+
+    The master would shut that one down as soon as we register: two bridges would end each other for ever.
+    """
+    try:
+        uri = str(master.call("lookupNode", master.caller))
+        if uri != own:
+            _call(uri, "getPid", master.caller)
+            return uri
+    except Unavailable:  # nobody has the name, or who had it does not answer any more
+        pass
+    return ""
 
 
 def _call(uri: str, method: str, *arguments: Any) -> Any:

@@ -1,14 +1,15 @@
 """Plain fields to the messages of installed ROS types, and back. Needs genpy and the message packages, not rospy.
 
-A text becomes what the field wants: a number (`21.5 °C` too), a boolean (`ON`), a time (ISO 8601). Every message
-is serialised once before it is published: one that cannot be would leave half of itself in rospy's buffer, and a
-latched one would break every later subscriber's connection.
+A text becomes what the field wants: a number (`21.5 °C` too), a boolean (`ON`), a time (ISO 8601). Messages are
+serialised here, not by rospy: one that cannot be would leave half of itself in its buffer, and a latched one would
+break every later subscriber's connection.
 """
 
 from __future__ import annotations
 
 import importlib
 import re
+import struct
 from collections.abc import Callable, Iterator
 from functools import cache
 from io import BytesIO
@@ -23,6 +24,7 @@ from services.errors import BadMessage
 MessageClass = Any  # classes that genpy generated carry no types
 TRUE = ("on", "true", "1", "open", "yes")
 FALSE = ("off", "false", "0", "closed", "no")
+LENGTH = struct.Struct("<I")
 ARRAY = re.compile(r"(.+)\[(\d*)\]")
 
 
@@ -32,6 +34,16 @@ def message_class(name: str) -> MessageClass | None:
     package, _, short = name.partition("/")
     try:
         return getattr(importlib.import_module(f"{package}.msg"), short, None)
+    except ImportError:
+        return None
+
+
+@cache
+def service_class(name: str) -> MessageClass | None:
+    """The class of `std_srvs/Trigger`; None when it is not installed."""
+    package, _, short = name.partition("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.srv"), short, None)
     except ImportError:
         return None
 
@@ -50,15 +62,22 @@ def faults(rule: Rule) -> Iterator[tuple[Path_, str]]:
 
 
 def build(kind: MessageClass, fields: Fields) -> Any:
-    """A message that can be serialised; BadMessage names the field that does not fit."""
-    message = _message(kind, fields, "")
+    """The message; BadMessage names the field that does not fit."""
+    return _message(kind, fields, "")
+
+
+def on_the_wire(message: Any) -> bytes:
+    """A message as rospy's connections carry it, its length before it; BadMessage when it cannot be serialised."""
+    buffer = BytesIO()
+    buffer.seek(LENGTH.size)
     try:
-        message.serialize(BytesIO())
+        message.serialize(buffer)
     except (ValueError, OverflowError) as error:
-        raise BadMessage(f"{kind._type}: {error}") from error
+        raise BadMessage(f"{message._type}: {error}") from error
     except _serialization_error() as error:
-        raise BadMessage(f"{kind._type}: {error}") from error
-    return message
+        raise BadMessage(f"{message._type}: {error}") from error
+    LENGTH.pack_into(buffer.getbuffer(), 0, buffer.tell() - LENGTH.size)
+    return buffer.getvalue()
 
 
 def fields_of(message: Any) -> Fields:
@@ -66,6 +85,7 @@ def fields_of(message: Any) -> Fields:
     return {name: _plain(getattr(message, name)) for name in message.__slots__}
 
 
+@cache
 def _serialization_error() -> type[Exception]:
     error: type[Exception] = importlib.import_module("genpy").SerializationError
     return error

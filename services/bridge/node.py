@@ -1,30 +1,33 @@
-"""What the service needs of ROS: a node that publishes fields and posts what it hears.
+"""What the service needs of ROS: a node that publishes fields, posts what it hears, and answers calls.
 
 Kept by `ros.py` (rospy) and `simulated.py` (no ROS). What comes from ROS is posted as `/ros/<topic>` with the
-fields as value; a change of the link to the master as `LINK`.
+fields as value, a call of a service of ours as `/ros-call/<service>` with a `Call`; a change of the link to the
+master as `LINK`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from services.bridge.rules import Fields, Rule
 
 FROM_ROS = "/ros"  # before the ROS topic: `/ros/iot_command`
+CALLED = "/ros-call"  # before the name of the ROS service
 LINK = "/bridge/link"
+CALL_S = 30.0  # a call that we have not answered by then fails
 
 
 @dataclass(frozen=True)
 class Outlet:
-    """A topic that we publish."""
+    """A topic that we publish. `latch`, `replay`: what is kept for who comes, the newest or that of every key."""
 
     topic: str
     type: str
     latch: bool = False
     replay: bool = False
-    queue: int = 10
+    queue: int = 10  # per subscriber, in turns: all that a turn says is one entry
 
 
 @dataclass(frozen=True)
@@ -36,50 +39,65 @@ class Inlet:
 
 
 @dataclass(frozen=True)
+class Server:
+    """A ROS service that we offer."""
+
+    name: str
+    type: str  # std_srvs/Trigger
+
+
+@dataclass(frozen=True)
+class Call:
+    """Somebody calls a service of ours; `answer` takes the response's fields, once, from any thread."""
+
+    fields: Fields
+    answer: Callable[[Fields], None]
+
+
+@dataclass(frozen=True)
+class Ports:
+    """All that a node has; `parameters` are set at the master by their full names."""
+
+    outlets: tuple[Outlet, ...] = ()
+    inlets: tuple[Inlet, ...] = ()
+    servers: tuple[Server, ...] = ()
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Link:
     """How we stand with the ROS master; `registrations`: how often everything was registered, 1 after the start."""
 
     up: bool
     text: str
     registrations: int = 0
-    ended: bool = False  # the master or someone else shut the node down; it cannot come back in this process
+    ended: bool = False  # somebody else has our name, or shut us down; the node cannot come back in this process
+    advice: str = ""  # what is wrong with it although it is up
 
 
 class Node(Protocol):
     """A ROS node as the service sees it. All calls come from the main thread and none waits for anything."""
 
     def publish(self, topic: str, fields: Fields, key: str = "") -> None:
-        """Sends, as far as somebody listens; `key`: whose newest message this is, on a topic with replay.
+        """Says it with the next `flush`; `key`: whose newest message this is, on a topic with replay.
 
         BadMessage when the fields do not fit the topic's type.
         """
 
+    def flush(self) -> None:
+        """Sends what was published since, as far as somebody listens."""
+
     def refresh(self) -> None:
-        """Sends every message that replay keeps once more, to all."""
+        """Says every message that replay keeps once more, to all."""
+
+    def listeners(self, topic: str) -> int:
+        """How many listen to a topic of ours."""
 
     def close(self) -> None:
         """Leaves the ROS graph."""
 
 
-class Kept:
-    """The newest message of each key, for each topic with replay.
-
-    One thread puts; any other reads a table that nobody changes any more.
-    """
-
-    def __init__(self) -> None:
-        self._tables: dict[str, dict[str, Any]] = {}
-
-    def put(self, topic: str, key: str, message: Any) -> None:
-        """Keeps a message instead of the older one of that key."""
-        self._tables[topic] = {**self._tables.get(topic, {}), key: message}
-
-    def of(self, topic: str) -> Iterable[Any]:
-        """All of a topic."""
-        return self._tables.get(topic, {}).values()
-
-
-def ports(rules: Iterable[Rule]) -> tuple[tuple[Outlet, ...], tuple[Inlet, ...]]:
+def ports(rules: Iterable[Rule]) -> Ports:
     """The ROS topics of the rules, each once."""
     outlets: dict[str, Outlet] = {}
     inlets: dict[str, Inlet] = {}
@@ -88,5 +106,5 @@ def ports(rules: Iterable[Rule]) -> tuple[tuple[Outlet, ...], tuple[Inlet, ...]]
             inlets[rule.ros] = Inlet(rule.ros, rule.type)
             continue
         queue = max(rule.queue, outlets[rule.ros].queue if rule.ros in outlets else 0)
-        outlets[rule.ros] = Outlet(rule.ros, rule.type, rule.latch, rule.replay, queue)
-    return tuple(outlets.values()), tuple(inlets.values())
+        outlets[rule.ros] = Outlet(rule.ros, rule.type, rule.latches, rule.replay, queue)
+    return Ports(tuple(outlets.values()), tuple(inlets.values()))

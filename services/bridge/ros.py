@@ -9,22 +9,30 @@ from __future__ import annotations
 import importlib
 import logging
 import os
+import queue
 import threading
-from collections.abc import Callable, Iterable, Iterator
+import time
+from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
-from services.bridge.master import Master, Registrations, register
-from services.bridge.messages import build, fields_of, message_class
-from services.bridge.node import FROM_ROS, LINK, Inlet, Kept, Link, Outlet
+from services.bridge import arguments, messages, reach
+from services.bridge.master import Master, Registrations, register, rival
+from services.bridge.node import CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Server
+from services.bridge.outgoing import Outgoing
 from services.bridge.rules import Fields
+from services.bridge.simtime import SimulatedTime
 from services.bus import Message
 from services.errors import ConfigError, Unavailable
 from services.runner import Post
 
 POLL_S = 0.5  # of the master's pid; a new master knows us again within this time and some milliseconds
 LEAVE_S = 2.0  # saying goodbye to a master that hangs must not hold up our end
-PACKAGES = "python3-rospy python3-diagnostic-msgs python3-geometry-msgs"
+PACKAGES = (
+    "python3-rospy python3-diagnostic-msgs python3-geometry-msgs python3-sensor-msgs python3-std-srvs "
+    "python3-tf2-msgs python3-nav-msgs"
+)
 
 log = logging.getLogger(__name__)
 
@@ -35,21 +43,29 @@ class RosNode:
     `publish` works before the master is there: what replay and latch keep is sent to those who come.
     """
 
-    def __init__(
-        self, name: str, master_uri: str | None, outlets: tuple[Outlet, ...], inlets: tuple[Inlet, ...], post: Post
-    ) -> None:
+    def __init__(self, name: str, master_uri: str | None, ports: Ports, post: Post) -> None:
+        arguments.hand_to_rospy(name)
         self._rospy = _rospy()
         if master_uri is not None:
             os.environ["ROS_MASTER_URI"] = master_uri
+        rosgraph = importlib.import_module("rosgraph")
         self._name = name
-        self._master = Master(os.environ.get("ROS_MASTER_URI", "http://localhost:11311"), f"/{name}")
-        self._outlets = {outlet.topic: outlet for outlet in outlets}
-        self._classes = {outlet.topic: message_class(outlet.type) for outlet in outlets}
-        self._inlets = inlets
+        caller = rosgraph.names.resolve_name(name, rosgraph.names.make_caller_id("unnamed"))
+        self._master = Master(rosgraph.get_master_uri() or "http://localhost:11311", caller)
+        self._ports = ports
+        self._outlets = {outlet.topic: outlet for outlet in ports.outlets}
+        self._classes = {outlet.topic: messages.message_class(outlet.type) for outlet in ports.outlets}
+        ends = (
+            OSError,
+            ValueError,
+            AttributeError,
+            self._rospy.ROSException,
+            self._rospy.exceptions.ROSInternalException,
+        )
+        self._outgoing = {outlet.topic: Outgoing(ends) for outlet in ports.outlets}
         self._post = post
-        self._kept = Kept()
-        self._publishers: dict[str, Any] = {}
-        self._handover = threading.Lock()  # between what was kept for a publisher and its first live message
+        self._clock = SimulatedTime(self._rospy)
+        self._opened = False
         self._stopping = threading.Event()
         self._registered_with: int | None = None
         self._link = Link(up=False, text="not yet")
@@ -59,19 +75,26 @@ class RosNode:
     def publish(self, topic: str, fields: Fields, key: str = "") -> None:
         """See `Node`."""
         outlet = self._outlets[topic]
-        message = build(self._classes[topic], fields)
-        with self._handover:
-            if outlet.replay or outlet.latch:
-                self._kept.put(topic, key if outlet.replay else "", message)
-            publisher = self._publishers.get(topic)
-        if publisher is not None:
-            self._send(publisher, message)
+        message = messages.build(self._classes[topic], fields)
+        self._clock.move(message)
+        self._outgoing[topic].say(
+            messages.on_the_wire(message), (key if outlet.replay else "") if outlet.replay or outlet.latch else None
+        )
+
+    def flush(self) -> None:
+        """See `Node`."""
+        for outgoing in self._outgoing.values():
+            outgoing.flush()
 
     def refresh(self) -> None:
         """See `Node`."""
-        for topic, publisher in self._publishers.items():
-            for message in self._kept.of(topic) if self._outlets[topic].replay else ():
-                self._send(publisher, message)
+        for topic, outlet in self._outlets.items():
+            if outlet.replay:
+                self._outgoing[topic].again()
+
+    def listeners(self, topic: str) -> int:
+        """See `Node`."""
+        return self._outgoing[topic].listeners
 
     def close(self) -> None:
         """See `Node`."""
@@ -80,12 +103,6 @@ class RosNode:
         leaving.start()
         leaving.join(LEAVE_S)
         self._registrar.join(LEAVE_S)
-
-    def _send(self, publisher: Any, message: Any) -> None:
-        try:
-            publisher.publish(message)
-        except self._rospy.ROSException as error:  # rospy closes topics when it is shut down; the registrar says why
-            log.debug("not sent: %s", error)
 
     def _register(self) -> None:
         """The registrar's thread."""
@@ -96,24 +113,33 @@ class RosNode:
                 self._registered_with = None
                 self._tell(Link(up=False, text=str(error), registrations=self._link.registrations))
             except self._rospy.ROSException as error:
-                self._tell(Link(up=False, text=str(error), registrations=self._link.registrations, ended=True))
+                self._end(str(error))
             self._stopping.wait(POLL_S)
 
     def _look(self) -> None:
         pid = self._master.pid()
-        if not self._publishers:
-            self._open()
         if self._rospy.is_shutdown():
-            self._ended()
-        elif pid != self._registered_with:
-            register(self._master, self._registrations())
-            self._registered_with = pid
-            registrations = self._link.registrations + 1
-            self._tell(Link(up=True, text=f"{self._master.uri} pid {pid}", registrations=registrations))
+            self._end(f"it was shut down from outside; most often another node is named {self._master.caller}")
+            return
+        if pid == self._registered_with:
+            self._registrations_module().get_topic_manager().check_all()  # who has gone is noticed in writing only
+            return
+        own = self._uri() if self._opened else ""
+        if other := rival(self._master, own):
+            self._end(
+                f"another node is named {self._master.caller}, at {other}: name one of them otherwise (bridge.node)"
+            )
+            return
+        if not self._opened:
+            self._open()
+        self._clock.follow(self._master)
+        register(self._master, self._registrations())
+        self._registered_with = pid
+        count, advice = self._link.registrations + 1, reach.advice(self._uri(), self._master.uri)
+        self._tell(Link(up=True, text=f"{self._master.uri} pid {pid}", registrations=count, advice=advice))
 
-    def _ended(self) -> None:
+    def _end(self, text: str) -> None:
         if not self._stopping.is_set():
-            text = f"shut down from outside; most often another node is named {self._master.caller}"
             self._tell(Link(up=False, text=text, registrations=self._link.registrations, ended=True))
 
     def _tell(self, link: Link) -> None:
@@ -125,63 +151,60 @@ class RosNode:
         """Makes the node and all its topics. Only `init_node` talks to the master, which has just answered."""
         with _logging_kept():
             self._rospy.init_node(self._name, disable_signals=True, disable_rosout=True, disable_rostime=True)
-        importlib.import_module("rospy.impl.registration").get_registration_listeners().clear()
-        publishers = {topic: self._publisher(outlet) for topic, outlet in self._outlets.items()}
-        for inlet in self._inlets:
-            self._rospy.Subscriber(
-                inlet.topic, message_class(inlet.type), self._heard, callback_args=inlet.topic, tcp_nodelay=True
-            )
-        with self._handover:
-            for topic, outlet in self._outlets.items():
-                for message in self._kept.of(topic) if outlet.latch else ():
-                    publishers[topic].publish(message)
-            self._publishers = publishers
+        self._opened = True
+        self._registrations_module().get_registration_listeners().clear()
+        for outlet in self._ports.outlets:
+            self._open_outlet(outlet)
+        for inlet in self._ports.inlets:
+            self._open_inlet(inlet)
+        for server in self._ports.servers:
+            self._open_server(server)
 
-    def _publisher(self, outlet: Outlet) -> Any:
-        greeter = _Greeter(lambda: self._kept.of(outlet.topic)) if outlet.replay else None
+    def _open_outlet(self, outlet: Outlet) -> None:
+        outgoing = self._outgoing[outlet.topic]
         publisher = self._rospy.Publisher(
-            outlet.topic,
-            self._classes[outlet.topic],
-            subscriber_listener=greeter,
-            tcp_nodelay=True,
-            latch=outlet.latch,
-            queue_size=outlet.queue,
+            outlet.topic, self._classes[outlet.topic], tcp_nodelay=True, latch=outlet.latch, queue_size=outlet.queue
         )
-        if greeter is not None:
-            greeter.lock = publisher.impl.publock
-        return publisher
+        outgoing.attach(publisher.impl)
+        publisher.impl.add_subscriber_listener(outgoing)
+
+    def _open_inlet(self, inlet: Inlet) -> None:
+        kind = messages.message_class(inlet.type)
+        self._rospy.Subscriber(inlet.topic, kind, self._heard, callback_args=inlet.topic, tcp_nodelay=True)
+
+    def _open_server(self, server: Server) -> None:
+        kind: Any = messages.service_class(server.type)
+        self._rospy.Service(server.name, kind, partial(self._called, server, kind._response_class))
 
     def _heard(self, message: Any, topic: str) -> None:
         """On rospy's threads, one per publisher."""
-        self._post(Message(FROM_ROS + topic, value=fields_of(message)))
+        self._post(Message(FROM_ROS + topic, value=messages.fields_of(message)))
+
+    def _called(self, server: Server, response: Any, request: Any) -> Any:
+        """On a thread of rospy per call, which may wait."""
+        answers: queue.SimpleQueue[Fields] = queue.SimpleQueue()
+        self._post(Message(CALLED + server.name, value=Call(messages.fields_of(request), answers.put)))
+        end = time.monotonic() + CALL_S
+        while not self._stopping.is_set() and time.monotonic() < end:
+            try:
+                return messages.build(response, answers.get(timeout=POLL_S))
+            except queue.Empty:
+                continue
+        raise self._rospy.ServiceException("the bridge ends" if self._stopping.is_set() else "no answer in time")
+
+    def _uri(self) -> str:
+        return str(importlib.import_module("rospy.core").get_node_uri())
+
+    def _registrations_module(self) -> Any:
+        return importlib.import_module("rospy.impl.registration")
 
     def _registrations(self) -> Registrations:
-        registration = importlib.import_module("rospy.impl.registration")
+        registration = self._registrations_module()
         topics, services = registration.get_topic_manager(), registration.get_service_manager()
-        uri = importlib.import_module("rospy.core").get_node_uri()
-        return Registrations(uri, topics.get_publications(), topics.get_subscriptions(), services.get_services())
-
-
-class _Greeter:
-    """Sends a new subscriber, and only it, what is kept (rospy's SubscribeListener).
-
-    Under the publisher's lock: without it a live message would share its buffer with ours, or overtake it with an
-    older one following.
-    """
-
-    def __init__(self, kept: Callable[[], Iterable[Any]]) -> None:
-        self._kept = kept
-        self.lock = threading.RLock()
-
-    def peer_subscribe(
-        self, topic: str, publish: Callable[[Any], None], publish_to_peer: Callable[[Any], None]
-    ) -> None:
-        with self.lock:
-            for message in self._kept():
-                publish_to_peer(message)
-
-    def peer_unsubscribe(self, topic: str, peers: int) -> None:
-        """Nothing to do."""
+        return Registrations(
+            self._uri(), topics.get_publications(), topics.get_subscriptions(), services.get_services(),
+            self._ports.parameters,
+        )  # fmt: skip
 
 
 def _rospy() -> Any:

@@ -17,6 +17,18 @@ from services.bridge.rules import Rule
 from services.document import Document, Path_
 
 DIAGNOSTICS = "/diagnostics"  # gathered by the bridge itself, once a second
+OWN = (
+    DIAGNOSTICS,
+    "/tf",
+    "/tf_static",
+    "/joint_states",
+    "/map",
+    "/map_metadata",
+    "/clock",
+    "/rosout",
+    "/iot_mission",
+    "/iot_mission/state",
+)
 Check = Callable[[Rule], Iterable[tuple[Path_, str]]]
 Numbered = tuple[int, Rule]  # where it stands in the file, and the rule for one camera
 
@@ -56,10 +68,10 @@ def collisions(rules: list[Numbered]) -> Iterator[tuple[int, str]]:
     first: dict[str, Rule] = {}
     seen: set[tuple[str, str, str]] = set()
     for index, rule in rules:
-        if rule.ros == DIAGNOSTICS:
-            yield index, f"expected another topic than {DIAGNOSTICS}, which the bridge gathers itself"
+        if rule.ros in OWN:
+            yield index, f"expected another topic than {rule.ros}, which the bridge says itself"
         other = first.setdefault(rule.ros, rule)
-        for name in ("type", "direction", "latch", "replay"):
+        for name in ("type", "direction", "latches", "replay"):
             here, there = getattr(rule, name), getattr(other, name)
             if here != there:
                 yield index, f"expected {name} {there!r} as in another rule for {rule.ros}, got {here!r}"

@@ -16,7 +16,7 @@ from pydantic import BaseModel, Field, field_validator, model_validator
 
 from services import topics
 from services.bridge import template
-from services.bus import Message
+from services.bus import Message, topic_matches
 from services.errors import BadMessage
 from services.section import Section
 
@@ -40,10 +40,12 @@ class Rule(Section):
     fields: Fields = {}  # to_ros: from levels, `{payload}`, `{payload.key}`, `{topic}`, `{received}`
     payload: Any = None  # to_mqtt: a text, or a mapping that becomes JSON
     tables: dict[str, dict[str, Any]] = {}  # of a field (`level`) or of `payload`: text to value, after the template
-    latch: bool = False  # ROS keeps the newest message for who comes later
+    latch: bool | None = None  # ROS keeps the newest message for who comes later; not said: as MQTT does there
     replay: bool = False  # who comes later is sent the newest message of every MQTT topic, and only he
     queue: int = Field(default=100, ge=1, le=100_000)  # per subscriber; the oldest goes when it is full
+    rate: float | None = Field(default=None, gt=0)  # per second and topic at most; of what comes faster the newest goes
     retain: bool = False  # to_mqtt, on a topic of your own; those of the table know it themselves
+    qos: Literal[0, 1] = 1  # the same; what comes from MQTT has that of its publisher
 
     @field_validator("ros")
     @classmethod
@@ -83,8 +85,8 @@ class Rule(Section):
         return self
 
     def _check_to_ros(self) -> None:
-        if self.payload is not None or self.retain:
-            raise ValueError("expected fields, and neither payload nor retain, in a rule to_ros")
+        if self.payload is not None or self.retain or self.qos != 1:
+            raise ValueError("expected fields, and neither payload, retain nor qos, in a rule to_ros")
         names = LEVEL.findall(self.mqtt)
         if len(names) != len(set(names)):
             raise ValueError("expected every {name} once in mqtt")
@@ -102,6 +104,14 @@ class Rule(Section):
             raise ValueError("expected no + or # in mqtt of a rule to_mqtt")
 
     @cached_property
+    def latches(self) -> bool:
+        """Whether the newest message is kept: what the table calls a state is retained on MQTT, and latched on ROS."""
+        if self.latch is not None:
+            return self.latch
+        kinds = [row.kind for row in topics.TABLE if topic_matches(row.filter, self.filter)]
+        return self.direction == "to_ros" and not self.replay and kinds == [topics.Kind.STATE]
+
+    @cached_property
     def filter(self) -> str:
         """The MQTT filter to subscribe to."""
         return LEVEL.sub("+", self.mqtt)
@@ -113,9 +123,10 @@ class Rule(Section):
         return re.compile(text.replace(r"/\#", r"(?:/.*)?").replace(r"\#", ".*").replace(r"\+", "[^/]+"))
 
 
-@dataclass(frozen=True)
+@dataclass
 class Heard:
-    """A bus message that was read: `row` and `levels` where the topic table knows it."""
+    """A bus message that was read: `row` and `levels` where the topic table knows it. Nobody changes it; frozen it
+    would cost a microsecond of each message more."""
 
     message: Message
     payload: str | bytes
@@ -205,7 +216,7 @@ def _said(rule: Rule, topic: str, text: str, now: float) -> Message:
     except UnicodeEncodeError as error:
         raise BadMessage(f"{rule.ros}: expected a text that UTF-8 can carry, {error.reason}") from error
     if _is_own(topic):
-        return Message(topic, payload, retain=rule.retain)
+        return Message(topic, payload, retain=rule.retain, qos=rule.qos)
     known = topics.read(Message(topic, payload, received=now), now)
     return known.topic.message(known.payload, **known.levels)
 

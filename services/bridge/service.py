@@ -1,35 +1,27 @@
 """Bus messages to ROS and back, by the rules; and what no rule can say.
 
-That is: only items of group ROS, only what their types allow, REFRESH, and the diagnostics. The ROS side is a
-`Node`, by rospy or simulated.
+That is: only items of group ROS, only what their types allow, REFRESH, and the diagnostics; more of it is in the
+parts (`part.py`). The ROS side is a `Node`, by rospy or simulated. How all is put together: `program.py`.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import logging
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
-from contextlib import closing, contextmanager
-from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
-
-from pydantic import Field
 
 from services import states, topics
-from services.bridge import messages, rulebook
+from services.bridge import rulebook
 from services.bridge.health import Health
-from services.bridge.node import FROM_ROS, LINK, Link, Node, Outlet, ports
-from services.bridge.ros import RosNode
+from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Node
+from services.bridge.pace import Pace
+from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard, Rule, read, to_mqtt, to_ros
-from services.bridge.simulated import SimulatedNode
-from services.bus import Message
-from services.errors import BadMessage
+from services.bus import Message, topic_matches
+from services.errors import ApartmentError, BadMessage
 from services.home import Home, Item
 from services.payloads import Diagnostic
-from services.runner import Post
-from services.section import Section
 
 DIAGNOSTICS_EVERY_S = 1.0
 SOONEST_S = 0.2  # between two diagnostics of our own, however much is refused
@@ -39,55 +31,69 @@ REMEMBERED_TOPICS = 10_000  # whose rules are found at once
 log = logging.getLogger(__name__)
 
 
-class Config(Section):
-    """The bridge's section of the configuration."""
-
-    rules: str = "bridge.yaml"  # which topics are bridged, and how
-    node: str = Field(default="iot_bridge", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # its name in the ROS graph
-    master_uri: str | None = None  # http://host:11311; without it ROS_MASTER_URI of the environment
-    simulated: bool = False  # a ROS node in memory, where there is no ROS
-    name: str = "bridge"
-    home: Home
-    cameras: tuple[str, ...] = ()
-    folder: Path
+class GivenUp(ApartmentError):
+    """The ROS node is gone and cannot come back in this process; the message says why."""
 
 
 class Bridge:
     """The service. `node` is its ROS side."""
 
-    def __init__(self, home: Home, rules: tuple[Rule, ...], node: Node) -> None:
+    def __init__(self, home: Home, rules: tuple[Rule, ...], node: Node, parts: tuple[Part, ...] = ()) -> None:
         self.node = node
+        self.parts = parts
         self.counters: Counter[str] = Counter(to_ros=0, to_mqtt=0, refused=0)
-        self.due: float | None = 0.0
         self._home = home
         self._to_ros = tuple(rule for rule in rules if rule.direction == "to_ros")
-        self._to_mqtt = tuple(rule for rule in rules if rule.direction == "to_mqtt")
-        filters = (*(rule.filter for rule in self._to_ros), topics.DIAGNOSTICS.filter)
-        self.subscribes = tuple(dict.fromkeys(filters))
+        self._to_mqtt: defaultdict[str, list[Rule]] = defaultdict(list)
+        for rule in rules:
+            if rule.direction == "to_mqtt":
+                self._to_mqtt[rule.ros].append(rule)
+        self._slow_to_ros: Pace[tuple[str, Fields, str]] = Pace()
+        self._slow_to_mqtt: Pace[Message] = Pace()
+        rows = (topics.DIAGNOSTICS, *(row for part in parts for row in part.rows))
+        self.subscribes = _apart([*(rule.filter for rule in self._to_ros), *(row.filter for row in rows)])
+        self._listening = {row: tuple(part for part in parts if row in part.rows) for row in rows}
+        self._serving = {server.name: part for part in parts for server in part.ports.servers}
+        self._hearing = {inlet.topic: part for part in parts for inlet in part.ports.inlets}
         self._rules_for = lru_cache(REMEMBERED_TOPICS)(self._find_rules)
         self._health = Health()
+        self._own_due = 0.0
         self._next_array = self._last_own = 0.0
+
+    @property
+    def due(self) -> float:
+        """See `Service`."""
+        slow = self._slow_to_ros.due, self._slow_to_mqtt.due
+        return min([self._own_due, self._next_array, *slow, *(part.due for part in self.parts)])
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
         """See `Service`; a refused message from ROS is a BadMessage, and a warning in `diagnostics/bridge`."""
-        if message.topic == LINK and isinstance(message.value, Link):
-            self._linked(message.value)
-        elif message.topic.startswith(FROM_ROS) and isinstance(message.value, dict):
-            return self._from_ros(message.topic.removeprefix(FROM_ROS), message.value, now)
-        else:
+        if message.value is None:
             self._from_bus(message, now)
+        elif message.topic == LINK and isinstance(message.value, Link):
+            self._linked(message.value)
+        elif message.topic.startswith(CALLED) and isinstance(message.value, Call):
+            name = message.topic.removeprefix(CALLED)
+            return self._serving[name].called(name, message.value, now)
+        elif isinstance(message.value, dict):
+            return self._from_ros(message.topic.removeprefix(FROM_ROS), message.value, now)
         return ()
 
     def tick(self, now: float) -> Iterator[Message]:
-        """Both diagnostics once a second; our own sooner when there is news."""
+        """Both diagnostics once a second, our own sooner when there is news; and sends all that this turn said."""
         if self._health.link.ended:
-            raise RuntimeError(f"the ROS node was {self._health.link.text}")
+            raise GivenUp(f"bridge: {self._health.link.text}")
+        yield from self._what_waited(now)
+        for part in self.parts:
+            yield from part.tick(self.node, now)
         if now >= self._next_array:
             self._next_array = now + DIAGNOSTICS_EVERY_S
-            self.node.publish(rulebook.DIAGNOSTICS, self._health.array(now))
-        if self.due is None or now >= self.due:
-            self._last_own, self.due = now, self._next_array
+            array = self._health.array(now, [one for part in self.parts for one in part.statuses(now)])
+            self.node.publish(rulebook.DIAGNOSTICS, array)
+        if now >= self._own_due:
+            self._last_own, self._own_due = now, self._next_array
             yield topics.DIAGNOSTICS.message(self._health.own(now, self.counters), component="bridge")
+        self.node.flush()
 
     def _linked(self, link: Link) -> None:
         if link.up != self._health.link.up:
@@ -96,7 +102,7 @@ class Bridge:
         self._soon()
 
     def _soon(self) -> None:
-        self.due = min(self.due or 0.0, self._last_own + SOONEST_S)
+        self._own_due = min(self._own_due, self._last_own + SOONEST_S)
 
     def _from_bus(self, message: Message, now: float) -> None:
         heard = read(message, now)
@@ -104,20 +110,35 @@ class Bridge:
             self._health.note(heard.levels["component"], heard.model, now)
         if heard.row is topics.HOME_STATE and not self._is_for_robots(heard):
             return
-        faults = [fault for rule in self._rules_for(message.topic) if (fault := self._apply(rule, heard))]
+        for part in self._listening.get(heard.row, ()) if heard.row else ():
+            part.hear(heard, now)
+        faults = [fault for rule in self._rules_for(message.topic) if (fault := self._apply(rule, heard, now))]
         if faults:
             raise faults[0]
 
-    def _apply(self, rule: Rule, heard: Heard) -> BadMessage | None:
+    def _apply(self, rule: Rule, heard: Heard, now: float) -> BadMessage | None:
         """One rule's fault does not keep the others from theirs."""
+        topic = heard.message.topic
         try:
             fields = to_ros(rule, heard)
+            if fields is not None and rule.rate is not None:
+                said = self._slow_to_ros.take((rule.ros, topic), rule.rate, (rule.ros, fields, topic), now)
+                fields = said[1] if said else None
             if fields is not None:
-                self.node.publish(rule.ros, fields, key=heard.message.topic)
+                self.node.publish(rule.ros, fields, key=topic)
                 self.counters["to_ros"] += 1
         except BadMessage as error:
-            return BadMessage(f"{heard.message.topic} to {rule.ros}: {error}")
+            return BadMessage(f"{topic} to {rule.ros}: {error}")
         return None
+
+    def _what_waited(self, now: float) -> Iterator[Message]:
+        """What came faster than its rule allows, as far as its time has come."""
+        for topic, fields, key in self._slow_to_ros.ready(now):
+            self.node.publish(topic, fields, key=key)
+            self.counters["to_ros"] += 1
+        for message in self._slow_to_mqtt.ready(now):
+            self.counters["to_mqtt"] += 1
+            yield message
 
     def _find_rules(self, topic: str) -> tuple[Rule, ...]:
         return tuple(rule for rule in self._to_ros if rule.pattern.fullmatch(topic))
@@ -131,20 +152,31 @@ class Bridge:
 
     def _from_ros(self, topic: str, fields: Fields, now: float) -> list[Message]:
         try:
-            wanted = [to_mqtt(rule, fields, now) for rule in self._to_mqtt if rule.ros == topic]
-            allowed = [message for message in wanted if not self._is_refresh(message)]
-            for message in allowed:
+            wanted = [(rule, to_mqtt(rule, fields, now)) for rule in self._to_mqtt[topic]]
+            asked = [(rule, message) for rule, message in wanted if not self._is_refresh(message)]
+            for _, message in asked:
                 self._check_home(message)
+            own = list(self._hearing[topic].heard_ros(topic, fields, now)) if topic in self._hearing else []
         except BadMessage as error:
             self.counters["refused"] += 1
             text = f"{topic} {_short(fields)}: {error}"
             self._health.refused(text, now)
             self._soon()
             raise BadMessage(text) from error
-        if len(allowed) < len(wanted):
+        if len(asked) < len(wanted):
             self.node.refresh()
+        allowed = [*own, *(message for rule, message in asked if self._may_go(rule, message, now))]
         self.counters["to_mqtt"] += len(allowed)
+        for message in allowed:
+            for part in self.parts:
+                part.said(message, now)
         return allowed
+
+    def _may_go(self, rule: Rule, message: Message, now: float) -> bool:
+        """Whether it may go now; otherwise it waits until it may."""
+        if rule.rate is None:
+            return True
+        return self._slow_to_mqtt.take((rule.ros, message.topic), rule.rate, message, now) is not None
 
     def _is_refresh(self, message: Message) -> bool:
         row, levels = _known(message.topic)
@@ -167,44 +199,19 @@ class Bridge:
         return self._home.ros_items[name]
 
 
-def check(config: Config) -> None:
-    """ConfigError with every fault of the rules; their types are checked where ROS is installed."""
-    known = _types(config) if importlib.util.find_spec("genpy") else rulebook.unchecked
-    rulebook.load(config.folder / config.rules, config.cameras, known)
+def _apart(filters: list[str]) -> tuple[str, ...]:
+    """Filters without those that another one covers: a broker may send what matches two of them twice."""
+    each = dict.fromkeys(filters)
+    return tuple(one for one in each if not any(other != one and topic_matches(other, one) for other in each))
 
 
-def _types(config: Config) -> rulebook.Check:
-    return rulebook.unchecked if config.simulated else messages.faults
-
-
-@contextmanager
-def start(config: Config, post: Post) -> Iterator[Bridge]:
-    """The service with its node; ConfigError when the rules cannot be used, or ROS is not installed."""
-    rules = rulebook.load(config.folder / config.rules, config.cameras, _types(config))
-    with closing(_node(config, rules, post)) as node:
-        yield Bridge(config.home, rules, node)
-
-
-def _node(config: Config, rules: tuple[Rule, ...], post: Post) -> SimulatedNode | RosNode:
-    outlets, inlets = ports(rules)
-    outlets = (*outlets, Outlet(rulebook.DIAGNOSTICS, "diagnostic_msgs/DiagnosticArray"))
-    outlets = tuple(_with_room(outlet, config.home) for outlet in outlets)
-    if config.simulated:
-        return SimulatedNode(outlets, inlets, post)
-    return RosNode(config.node, config.master_uri, outlets, inlets, post)
-
-
+@lru_cache(REMEMBERED_TOPICS)
 def _known(topic: str) -> tuple[topics.Topic | None, dict[str, str]]:
     """The row of the topic table; none for topics of the rules' author."""
     try:
         return topics.find(topic)
     except BadMessage:
         return None, {}
-
-
-def _with_room(outlet: Outlet, home: Home) -> Outlet:
-    """A subscriber's queue holds the whole replay, and what happens meanwhile."""
-    return replace(outlet, queue=outlet.queue + len(home.items)) if outlet.replay else outlet
 
 
 def _short(fields: Fields) -> str:

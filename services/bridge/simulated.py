@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from services.bridge.node import FROM_ROS, LINK, Inlet, Kept, Link, Outlet
+from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Ports
 from services.bridge.rules import Fields
 from services.bus import Message
 from services.errors import BadMessage
@@ -18,11 +18,13 @@ REMEMBERED = 1000  # published messages that a test can look at
 class SimulatedNode:
     """Keeps `published`, and hands each message to those who `subscribe`, as rospy's node would."""
 
-    def __init__(self, outlets: tuple[Outlet, ...], inlets: tuple[Inlet, ...], post: Post) -> None:
-        self._outlets = {outlet.topic: outlet for outlet in outlets}
-        self._inlets = {inlet.topic for inlet in inlets}
+    def __init__(self, ports: Ports, post: Post) -> None:
+        self.ports = ports
+        self._outlets = {outlet.topic: outlet for outlet in ports.outlets}
+        self._inlets = {inlet.topic for inlet in ports.inlets}
+        self._servers = {server.name for server in ports.servers}
         self._post = post
-        self._kept = Kept()
+        self._kept: dict[str, dict[str, Fields]] = {}
         self._subscribers: dict[str, list[Hear]] = {}
         self.published: deque[tuple[str, Fields]] = deque(maxlen=REMEMBERED)
         post(Message(LINK, value=Link(up=True, text="simulated, no ROS", registrations=1)))
@@ -31,14 +33,21 @@ class SimulatedNode:
         """See `Node`."""
         outlet = self._outlets[topic]
         if outlet.replay or outlet.latch:
-            self._kept.put(topic, key if outlet.replay else "", fields)
+            self._kept.setdefault(topic, {})[key if outlet.replay else ""] = fields
         self._say(topic, fields)
+
+    def flush(self) -> None:
+        """See `Node`; here everything is said at once."""
 
     def refresh(self) -> None:
         """See `Node`."""
         for topic, outlet in self._outlets.items():
-            for fields in self._kept.of(topic) if outlet.replay else ():
+            for fields in self._kept.get(topic, {}).values() if outlet.replay else ():
                 self._say(topic, fields)
+
+    def listeners(self, topic: str) -> int:
+        """See `Node`."""
+        return len(self._subscribers.get(topic, ()))
 
     def close(self) -> None:
         """See `Node`."""
@@ -46,7 +55,7 @@ class SimulatedNode:
 
     def subscribe(self, topic: str, hear: Hear) -> None:
         """What `rostopic echo` does: first what is kept, then everything."""
-        for fields in self._kept.of(topic):
+        for fields in self._kept.get(topic, {}).values():
             hear(fields)
         self._subscribers.setdefault(topic, []).append(hear)
 
@@ -55,6 +64,12 @@ class SimulatedNode:
         if topic not in self._inlets:
             raise BadMessage(f"expected one of {', '.join(sorted(self._inlets))}, got {topic!r}")
         self._post(Message(FROM_ROS + topic, value=fields))
+
+    def call(self, name: str, fields: Fields, answer: Callable[[Fields], None]) -> None:
+        """What `rosservice call` does; BadMessage when there is no such service."""
+        if name not in self._servers:
+            raise BadMessage(f"expected one of {', '.join(sorted(self._servers))}, got {name!r}")
+        self._post(Message(CALLED + name, value=Call(fields, answer)))
 
     def _say(self, topic: str, fields: Fields) -> None:
         self.published.append((topic, fields))

@@ -10,7 +10,19 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
 
 WAKE_TOPIC = "/bus/wake"  # posted to end a wait; no service sees it
+SESSION_TOPIC = "/bus/session"  # posted at each connection; `value`: whether the broker had kept our messages
 LOST_TOPIC = "/bus/lost"  # posted when the connection breaks, to a service that has subscribed to it
+
+
+class Delivery(NamedTuple):
+    """How a message with QoS 1 came: what acknowledges it, within the connection (counted from 1) that it came by.
+
+    `again`: the broker says that it has sent this packet before, in this session (MQTT's flag DUP).
+    """
+
+    connection: int
+    packet: int
+    again: bool
 
 
 class Message(NamedTuple):
@@ -31,7 +43,7 @@ class Message(NamedTuple):
     correlation: bytes | None = None
     expires_s: int | None = None  # MQTT 5 message expiry; None: never
     once: bool = False  # a state of somebody else's topic (a restored one): not said again after a reconnect
-    token: object = None  # what the bus needs to acknowledge this one
+    token: Delivery | None = None  # what the bus needs to acknowledge this one
 
 
 class Bus(Protocol):

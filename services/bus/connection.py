@@ -17,7 +17,7 @@ from services.bus import Message
 
 Protocol = Literal[4, 5]
 WINDOW = 1000  # messages in a turn, and in flight from the broker (its max_inflight_messages is the same)
-QUEUED = 10_000  # outgoing messages that paho holds; more wait in the outbox
+QUEUED = 50_000  # outgoing messages that paho holds, as in a burst of a robot; more wait in the outbox
 CONNECT_TIMEOUT_S = 3.0
 
 

@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 
-from services.bus import LOST_TOPIC, WAKE_TOPIC, Message, topic_matches
+from services.bus import LOST_TOPIC, WAKE_TOPIC, Delivery, Message, topic_matches
 from services.bus.outbox import Outbox
 
 WINDOW = 1000
@@ -28,12 +28,12 @@ class Hub:
     def deliver(self, message: Message) -> None:
         """Hands a published message to everyone who asked for it; retained ones are kept for who comes later."""
         if message.retain:
-            self.retained[message.topic] = message
+            self.retained[message.topic] = message._replace(token=None)
             if not message.payload:
                 del self.retained[message.topic]
         for client in list(self.clients):
             if client.wants(message.topic):
-                client.take(message._replace(retain=False))
+                client.take(message._replace(retain=False, token=None))
 
     def down(self, *, forget: bool = False) -> None:
         """The broker goes away, every connection breaks. `forget`: it had no persistence, retained states go too."""
@@ -60,6 +60,7 @@ class MemoryBus:
         self.durable = durable
         self.connected = False
         self.connections = 0
+        self._packet = 1
         self._will = will
         self._filters: list[str] = []
         self._inbox: queue.SimpleQueue[Message] = queue.SimpleQueue()
@@ -106,7 +107,13 @@ class MemoryBus:
 
     def take(self, message: Message) -> None:
         """Puts a delivered message into the inbox."""
-        taken = message._replace(received=self.hub.clock(), token=self.connections)
+        packet, again = self._packet, False
+        if message.token is not None:  # of an older connection: it is the same packet
+            packet, again = message.token.packet, True
+        else:
+            self._packet = packet % 65535 + 1
+        token = Delivery(self.connections, packet, again)
+        taken = message._replace(received=self.hub.clock(), token=token)
         if message.qos and self.durable:
             self._unacked.append(taken)
         if self.connected:
@@ -160,4 +167,4 @@ class MemoryBus:
 
     def _came_before(self, message: Message) -> bool:
         """Of an older connection of a durable session: it comes again."""
-        return self.durable and message.token is not None and message.token != self.connections
+        return self.durable and message.token is not None and message.token.connection != self.connections

@@ -14,13 +14,13 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import paho.mqtt.client as paho
 from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.reasoncodes import ReasonCode
 
-from services.bus import LOST_TOPIC, WAKE_TOPIC, Message, connection, topic_matches
+from services.bus import LOST_TOPIC, SESSION_TOPIC, WAKE_TOPIC, Delivery, Message, connection, topic_matches
 from services.bus.connection import CONNECT_TIMEOUT_S, WINDOW, Address
 from services.bus.outbox import Outbox
 
@@ -32,14 +32,6 @@ INBOX = 20_000  # waiting messages, beyond which those of QoS 0 are dropped
 RETRY_S = (0.1, 1.0)  # between attempts to connect: first, longest; a restarted broker is met again within 2 s
 FAREWELL_S = 2.0
 WAKE = Message(WAKE_TOPIC)
-
-
-class Token(NamedTuple):
-    """What acknowledges a message: only within the connection that it came by."""
-
-    connection: int
-    mid: int
-    dup: bool
 
 
 class MqttBus:
@@ -54,7 +46,6 @@ class MqttBus:
     ) -> None:
         self.address = address
         self.connections = 0
-        self.session_present = False
         self._protocol = address.protocol
         self._negotiated = address.protocol == 4
         self._will = will
@@ -64,7 +55,7 @@ class MqttBus:
         self._outbox = Outbox(self._send, birth)
         self._in_flight: dict[int, Message] = {}  # events that the broker has not acknowledged yet
         self._acknowledged: deque[int] = deque()
-        self._to_acknowledge: deque[Token] = deque()
+        self._to_acknowledge: deque[Delivery] = deque()
         self._client: paho.Client | None = None
         self._up = 0  # the number of the connection that stands; set by paho's thread
         self._greeted = 0  # the one on which the outbox has spoken; set by the service's thread
@@ -123,7 +114,7 @@ class MqttBus:
 
     def ack(self, messages: Iterable[Message]) -> None:
         """See `Bus`."""
-        self._to_acknowledge.extend([one.token for one in messages if one.qos and isinstance(one.token, Token)])
+        self._to_acknowledge.extend([one.token for one in messages if one.qos and one.token is not None])
         if (
             self._inbox.empty()
         ):  # else the network's thread does it at the next message: two busy threads hinder each other
@@ -151,7 +142,7 @@ class MqttBus:
             except IndexError:  # the other thread was faster
                 return
             if token.connection == self._up:
-                client.ack(token.mid, 1)
+                client.ack(token.packet, 1)
 
     def _keep_up(self) -> None:
         self._forget_acknowledged()
@@ -168,7 +159,7 @@ class MqttBus:
         """Without what only woke us, and without what the broker will send a durable client again."""
         if self.address.durable:
             now = self.connections
-            taken = [one for one in taken if not isinstance(one.token, Token) or one.token.connection == now]
+            taken = [one for one in taken if one.token is None or one.token.connection == now]
         return [one for one in taken if one.topic != WAKE_TOPIC]
 
     def _send(self, message: Message) -> bool:
@@ -253,11 +244,12 @@ class MqttBus:
             log.info("connected to %s:%s", self.address.host, self.address.port)
             self._told = ""
         self._client = client
-        self.session_present = bool(flags.session_present)
         self._acknowledged.clear()
         self.connections += 1
         self._up = self.connections  # before the filters are read: what is asked for meanwhile sees that it is up
         self._subscribe(client, self._filters)
+        if SESSION_TOPIC in self._filters:
+            self.post(Message(SESSION_TOPIC, value=bool(flags.session_present)))
         self._inbox.put(WAKE)
 
     def _subscribe(self, client: paho.Client, filters: Sequence[str]) -> None:
@@ -285,7 +277,7 @@ class MqttBus:
         if message.qos == 0 and self._inbox.qsize() > INBOX:  # QoS 1 is held back by the window instead
             self._overrun += 1
             return
-        token = Token(self.connections, message.mid, message.dup)
+        token = Delivery(self.connections, message.mid, message.dup)
         came = Message(topic, bytes(message.payload), message.retain, message.qos, self._clock(), token=token)
         asked = message.properties
         if asked is not None and hasattr(asked, "ResponseTopic"):

@@ -7,6 +7,8 @@ from typing import Any, cast
 
 from services.camera import commands, orders
 from services.camera.bulletin import Bulletin
+from services.camera.calibration.calibrator import Calibrator
+from services.camera.calibration.wishes import TakeLens
 from services.camera.health import Health
 from services.camera.looks import Looks
 from services.camera.orders import Command
@@ -30,7 +32,7 @@ from services.camera.video.feed import Feed
 from services.payloads import Place
 
 # These are taken while it is away too; a stream can be switched off then.
-WITHOUT_CAMERA = orders.ShowScan | orders.Targets | orders.Routine | orders.Broadcast
+WITHOUT_CAMERA = orders.ShowScan | orders.Targets | orders.Routine | orders.Broadcast | TakeLens
 DOWN_S = 20.0  # a camera that still answers so long after the order does not reboot (or was too quick to be seen)
 UP_S = 180.0  # 40 to 105 s were seen
 
@@ -39,7 +41,14 @@ class Chores:
     """Makes the plan for each of these orders."""
 
     def __init__(
-        self, places: Places, scanner: Scanner, health: Health, bulletin: Bulletin, feed: Feed, takes: Takes
+        self,
+        places: Places,
+        scanner: Scanner,
+        health: Health,
+        bulletin: Bulletin,
+        feed: Feed,
+        takes: Takes,
+        calibrator: Calibrator,
     ) -> None:
         self.places = places
         self.scanner = scanner
@@ -60,6 +69,7 @@ class Chores:
             commands.PlaySound: lambda order, now: self.takes.play(order, now),
             orders.Broadcast: feed.switch,
             orders.Restart: self._restart,
+            TakeLens: calibrator.take_lens,
         }
 
     def plan(self, command: Command, now: float) -> Plan[None]:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
+from math import radians
+
+import numpy as np
 
 from services import document
 from services.camera.address import Address
 from services.camera.alarm.listener import Listener
+from services.camera.calibration import levels
+from services.camera.calibration.study import Studio
 from services.camera.device import Device
 from services.camera.places import Places
 from services.camera.scan.analysis import Pool
@@ -32,7 +37,8 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
         watchdog = stack.enter_context(closing(Watchdog(config.brand, address)))
         device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell, owing=gate.owe)
         made_sound = getattr(brand(config.brand), "sound", None)
-        sender = stack.enter_context(closing(Desk(device, made_sound(address, gate) if made_sound else None, post)))
+        desk = Desk(device, made_sound(address, gate) if made_sound else None, post)
+        sender = stack.enter_context(closing(Studio(desk, post)))
         listener = _listener(config, address, gate, post)
         if listener is not None:
             stack.callback(listener.close)
@@ -71,4 +77,7 @@ def eye(config: Config) -> Eye:
         except (ValueError, AttributeError) as error:
             raise ConfigError([f"{file}:1: {error}"]) from error
     mount = config.mount.mount() if config.mount else None
-    return Eye(config.name, config.dictionary, lens, mount, config.zoom_range[0])
+    zoom = levels.read(levels.of_lens(config.folder / config.camera_info)) if config.camera_info is not None else ()
+    widest, noise, (doubt_m, doubt_deg) = config.zoom_range[0], config.reading_noise_deg, config.mount_doubt
+    doubt = np.diag(np.square([doubt_m] * 3 + [radians(doubt_deg)] * 3))
+    return Eye(config.name, config.dictionary, lens, mount, widest, zoom, angle_noise_deg=noise, mount_doubt=doubt)

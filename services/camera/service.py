@@ -16,12 +16,14 @@ from services.camera.alarm.listener import HEARD, Heard
 from services.camera.alarm.motion import MotionWatch
 from services.camera.answers import Answers, Job
 from services.camera.bulletin import Bulletin
+from services.camera.calibration.calibrator import Calibrator
 from services.camera.capabilities import Abilities
 from services.camera.chores import WITHOUT_CAMERA, Chores
+from services.camera.commands import VideoMode
 from services.camera.device import REPLY, Sender
 from services.camera.discovery import Discovery
 from services.camera.health import IDLE_S, Health
-from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
+from services.camera.orders import Command, GotoPlace, LookAt
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
 from services.camera.ptz.motors import Motors
@@ -30,13 +32,14 @@ from services.camera.requests import GetPicture, Identify, Identity, Picture, Ra
 from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
 from services.camera.scan.sightings import Eye
+from services.camera.scan.wish import ScanFor
 from services.camera.settings import Config
 from services.camera.sound.takes import Takes
 from services.camera.upkeep import Upkeep
 from services.camera.video.channel import ASKED, Channel
 from services.camera.video.feed import Feed
 from services.errors import BadMessage
-from services.payloads import Order, OrderState, PositionSet
+from services.payloads import Order, OrderState, PositionSet, ScanResult
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
 STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
@@ -65,6 +68,7 @@ class CameraService:
                 topics.CAMERA_ORDER,
                 topics.CAMERA_POSITION_SET,
                 topics.CAMERA_SNAPSHOT_GET,
+                topics.CAMERA_MARKER,
                 topics.HOMEASSISTANT_ENTITY,
                 topics.HOMEASSISTANT_STATUS,
             )
@@ -85,10 +89,12 @@ class CameraService:
         self.trips = Trips(config, self.bulletin, self.places)
         self.motors.skill = self.trips.skill
         self.scanner = Scanner(config, self.trips.skill, eye, analyst, self.bulletin, self.places)
+        self.scanner.begin = self._begin
+        self.calibrator = Calibrator(config, self.trips, self.scanner, publish)
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
-        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes)
+        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes, self.calibrator)
         self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=hears)
         self.upkeep = Upkeep(config.name, config.clock, self.bulletin.facts, self._has_time)
         self.abilities = Abilities(config.state and config.state / f"{config.name}-can.json", self._has_time)
@@ -142,7 +148,7 @@ class CameraService:
         self._watch_motion(now)
         self.bulletin.tick(now, self.counters)
         self.discovery.tick(self.bulletin.identity, self.places.named)
-        self.due = min(time for time in (self.bulletin.due, self.stage.due) if time is not None)
+        self.due = min(time for time in (self.bulletin.due, self.stage.due, self.scanner.due) if time is not None)
         return self._flush()
 
     def _watch_motion(self, now: float) -> None:
@@ -210,6 +216,7 @@ class CameraService:
                 self.stage.begin(self.abilities.meet(self.bulletin.identity, now), now, _nobody)
                 now = (yield from attempt(GetPicture())).received
                 self.upkeep.met()
+                self.stage.begin(self.scanner.restored(), now, _nobody)
                 if self.bulletin.turning:
                     self.motors.make_sure(now)
             met = self.health.online
@@ -220,6 +227,8 @@ class CameraService:
             self.stage.begin(self.feed.published(), now, _nobody)
         elif read.topic in (topics.HOMEASSISTANT_ENTITY, topics.HOMEASSISTANT_STATUS):
             self.discovery.hear(read)
+        elif isinstance(payload, ScanResult):
+            self.scanner.remember(payload)  # also of another life of this service
         elif isinstance(payload, PositionSet):
             value = payload.model_dump(exclude={"id", "by"}, exclude_none=True)
             job = life.job("Position", value, payload.by, payload.id, read.message)
@@ -249,6 +258,8 @@ class CameraService:
         elif isinstance(command, orders.Motor):
             self.motors.order(job, now)
         else:
+            if isinstance(command, VideoMode):
+                self.scanner.modes.give_over()
             self.answers.tell(job, "running")
             self.stage.begin(self.chores.plan(command, now), now, lambda run, now: self._chore_ended(job, run))
 
@@ -275,8 +286,8 @@ class CameraService:
     def _motor_plan(self, command: Command, now: float) -> Plan[object]:
         if isinstance(command, ScanFor):
             return self.scanner.plan(command, now)
-        if isinstance(command, orders.Calibrate):
-            return self.trips.calibrate()
+        if isinstance(command, orders.Calibration):
+            return self.calibrator.plan(command, now)
         assert isinstance(command, GotoPlace | LookAt)
         return self.trips.plan(command, now)
 

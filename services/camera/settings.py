@@ -8,25 +8,35 @@ from zoneinfo import available_timezones
 
 from pydantic import Field, SecretStr, field_validator, model_validator
 
+from services.camera import parameters
 from services.camera.address import Address
 from services.camera.ptz.goal import Limits
 from services.camera.video.settings import SnapshotSettings, StreamSettings
 from services.section import Section
 from services.vision.frames import Mount
+from services.vision.prior import Faces, Prior
 
 Pair = tuple[float, float]
 LOW = {"diagnostics": False, "alarm": False, "frames": 1}  # for a small computer, as the report ran its Raspberry Pi
 
 
 class MarkerSizes(Section):
-    """Side of the black square in metres: of every marker, and of those that differ, by id."""
+    """Side of the black square in metres, how it faces, and where some are: of every marker, and by id."""
 
     size: float = Field(default=0.14, gt=0.005, lt=2)
     sizes: dict[int, float] = {}
+    faces: Faces | None = None  # "up": lies flat; "wall": hangs upright; None: anyhow
+    facing: dict[int, Faces | None] = {}
+    known: dict[int, tuple[float, float, float]] = {}  # centres that somebody measured (m, apartment), for the mount
 
     def of(self, marker: int) -> float:
         """The side of that marker, metres."""
         return self.sizes.get(marker, self.size)
+
+    def prior(self, marker: int) -> Prior | None:
+        """What is known of how that marker is turned."""
+        faces = self.facing.get(marker, self.faces)
+        return Prior(faces) if faces else None
 
 
 class PictureOptions(Section):
@@ -70,10 +80,20 @@ class MountSettings(Section):
     pan_to_tilt_m: Pair = (0.0, 0.0)  # forward, along the pan axis away from the plate
     tilt_to_lens_m: Pair = (0.0, 0.0)  # along the optical axis, up in the picture
     sensor_roll_deg: float = 0.0
+    tilt_zero_deg: float = 0.0  # the tilt reading at which the optical axis is level
 
     def mount(self) -> Mount:
         """The same for the formulas."""
         return Mount(**self.model_dump())
+
+
+def _under(given: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+    """Both together; where both say something, `values` count."""
+    parts = {
+        key: _under(inner, values[key]) for key, inner in given.items()
+        if isinstance(inner, dict) and isinstance(values.get(key), dict)
+    }  # fmt: skip
+    return {**given, **values, **parts}
 
 
 class Config(Section):
@@ -83,6 +103,7 @@ class Config(Section):
     folder: Path = Path()
     state: Path | None = None  # where what is learnt of the camera is kept; None: nowhere
     profile: Literal["full", "low"] = "full"  # "low": what is not given is as in LOW
+    parameters: Path | None = None  # a ROS node's parameters.yaml: what is not given is as there
     brand: str = "amcrest"  # a module of `camera/brands/`
     url: str
     rtsp_port: int = Field(default=554, ge=1, le=65535)
@@ -106,22 +127,30 @@ class Config(Section):
     tilt_range: Pair = (-10.0, 108.0)
     zoom_range: Pair = (0.0, 8.0)
     mount: MountSettings | None = None
+    mount_doubt: Pair = (0.0, 0.0)  # m and degrees, each axis, one standard deviation: as a calibration tells them
+    reading_noise_deg: float = Field(default=0.05, ge=0, le=2)  # of pan and tilt, one standard deviation
     routine: tuple[str, ...] | None = None  # places that a scan visits, in order; None: all, on the shortest way
     frames: int = Field(default=4, ge=1, le=50)  # at each place of a scan
-    settle_s: float = Field(default=0.6, ge=0, le=10)  # from rest to the first frame: the picture's own delay
+    settle_s: float | None = Field(
+        default=None, ge=0, le=10
+    )  # from rest to the first frame; None: as the picture shows
     stop_early: bool = True  # a scan ends when every target was seen where it shows best
+    second_turn: Literal["missed", "always", "never"] = "missed"  # in black and white with high contrast
     move_timeout_s: float = Field(default=60.0, gt=1, le=600)
     stream: StreamSettings = StreamSettings()
     snapshot: SnapshotSettings = SnapshotSettings()
-    scan_pictures: Literal["snapshot", "stream"] = "snapshot"  # what a scan looks at, where a stream is on
+    scan_pictures: Literal["stream", "snapshot"] = "stream"  # what a scan looks at, where the camera has a stream
+    hits: int = Field(default=100, ge=0, le=10000)  # pictures of what scans have seen that are kept; 0: none
     workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
 
     @model_validator(mode="before")
     @classmethod
-    def profile_gives_what_is_not_said(cls, values: Any) -> Any:
-        if isinstance(values, dict) and values.get("profile") == "low":
-            return {**LOW, **values}
-        return values
+    def others_give_what_is_not_said(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        if isinstance(values.get("parameters"), str | Path):
+            values = _under(parameters.read(Path(values.get("folder", "")) / values["parameters"]), values)
+        return {**LOW, **values} if values.get("profile") == "low" else values
 
     @field_validator("url")
     @classmethod

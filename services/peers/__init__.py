@@ -7,18 +7,20 @@ own pid. In an installation these programs belong to the system and nothing here
 from __future__ import annotations
 
 import os
+import random
 import shutil
 import signal
 import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from services.errors import ApartmentError
 
 POLL_S = 0.02
+NO_CLIENTS = range(12000, 32768)  # Linux gives outgoing connections ports from 32768 on
 
 
 class Missing(ApartmentError):
@@ -34,10 +36,12 @@ def program(name: str, package: str) -> str:
 
 
 def free_port() -> int:
-    """A TCP port of loopback that nobody uses now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """A TCP port of loopback that nobody uses now, and that no client is given until a server has taken it."""
+    while True:
+        port = random.SystemRandom().choice(NO_CLIENTS)
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
 def answers(port: int, host: str = "127.0.0.1") -> bool:

@@ -32,7 +32,7 @@ CREATE DATABASE IF NOT EXISTS `{database}` CHARACTER SET utf8mb4;
 CREATE DATABASE IF NOT EXISTS `{view_database}` CHARACTER SET utf8mb4;
 CREATE OR REPLACE USER `{user}`@`%` IDENTIFIED BY '{password}';
 CREATE OR REPLACE USER `{reader}`@`%` IDENTIFIED BY '{reader_password}';
-GRANT SELECT, INSERT, UPDATE, DELETE, CREATE, ALTER, INDEX ON `{database}`.* TO `{user}`@`%`;
+GRANT SELECT, INSERT, UPDATE, DELETE, CREATE, ALTER, DROP, INDEX ON `{database}`.* TO `{user}`@`%`;
 GRANT SELECT, CREATE VIEW, SHOW VIEW, DROP ON `{view_database}`.* TO `{user}`@`%`;
 GRANT SELECT ON `{view_database}`.* TO `{reader}`@`%`;
 """

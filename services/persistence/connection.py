@@ -35,6 +35,11 @@ class Connection:
         except Unavailable as error:
             self._tell(error)
 
+    @property
+    def opened(self) -> Storage | None:
+        """The storage as far as it is open now."""
+        return self._storage
+
     def storage(self, now: float) -> Storage:
         """The open storage; one attempt to open it when that is due."""
         if self._storage is None:

@@ -7,11 +7,15 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
+from dataclasses import replace
 
 from services.home import Home
 from services.persistence import rows, strategies
+from services.persistence.filters import Kept
 from services.persistence.rows import State
+from services.persistence.strategies import Rule
+from services.states import SPECIAL
 from services.storage import Batch, Diagnostic, Item, Row, Sample
 
 log = logging.getLogger(__name__)
@@ -20,11 +24,14 @@ log = logging.getLogger(__name__)
 class Decisions:
     """What of a turn is to be written. `learn` comes first: without the last values every state is a change."""
 
-    def __init__(self, home: Home, counters: Counter[str]) -> None:
+    def __init__(self, home: Home, rules: Mapping[str, Rule], counters: Counter[str]) -> None:
         self._home = home
         self._counters = counters
-        self._rules = strategies.rules(home)
-        self._last: dict[str, strategies.Value] = {}
+        self._rules = rules
+        self._last: dict[str, strategies.Value] = {}  # as heard, else as stored: what a change is measured by
+        self._stored: dict[str, Sample] = {}
+        self._heard: dict[str, State] = {}  # what a cron strategy stores
+        self._passed: dict[tuple[str, int], Kept] = {}  # by item and line: what the filters compare with
         self._levels: dict[str, tuple[int, str]] = {}  # of components: level and message
         self._odd: set[str] = set()  # items of which a value in another unit was told
 
@@ -35,14 +42,15 @@ class Decisions:
 
     def learn(self, last: Mapping[str, Sample], diagnostics: Mapping[str, Diagnostic]) -> None:
         """What the last rows are: what a change is measured by."""
+        self._stored = dict(last)
         self._last = {name: (sample.num, sample.text) for name, sample in last.items()}
         self._levels = {name: (row.level, row.message) for name, row in diagnostics.items()}
 
     def last_text(self, name: str, items: Mapping[str, Item]) -> str | None:
         """The last stored state as OpenHAB writes it; None where there is none worth restoring."""
-        if name not in self._last or name not in items:
+        if name not in self._stored or name not in items:
             return None
-        text = rows.state_text(Sample(name, 0, *self._last[name]), items[name].unit)
+        text = rows.state_text(self._stored[name], items[name].unit)
         return None if text == "NULL" else text
 
     def new_items(self, gathered: Iterable[State | Row], known: Mapping[str, Item]) -> list[Item]:
@@ -76,18 +84,61 @@ class Decisions:
                 batch.rows.append(one)
         return batch
 
+    def heard(self, state: State) -> None:
+        """The echo of a restored state: nothing to store, but what the item is now."""
+        self._heard[state.item] = state
+
+    def fired(self, names: Set[str], items: Mapping[str, Item], next_time: Callable[[], int]) -> Batch:
+        """What cron strategies store when they fire: the present states, changed or not, but never UNDEF and NULL."""
+        batch = Batch()
+        for name, state in self._heard.items() if names else ():
+            rule = self._rule(name)
+            lines = [n for n, line in enumerate(rule.lines) if any(cron in names for cron, _ in line.crons)]
+            if lines and name in items and state.text not in SPECIAL:
+                again = replace(state, time=next_time())
+                if self._passes(again, rule, lines):
+                    self._keep(batch, again, items[name].unit)
+        return batch
+
     def _add_state(self, batch: Batch, state: State, items: Mapping[str, Item]) -> None:
         rule = self._rule(state.item)
         if not rule.stores:
             return
         unit = items[state.item].unit
         sample = rows.sample(state, unit)
-        value, last = (sample.num, sample.text), self._last.get(state.item)
-        if not strategies.is_wanted(rule, value, last, retained=state.retained):
-            return
+        value = (sample.num, sample.text)
+        changed = value != self._last.get(state.item)
+        self._last[state.item], self._heard[state.item] = value, state
+        lines = [n for n, line in enumerate(rule.lines) if line.wants(changed=changed, retained=state.retained)]
+        if lines and self._passes(state, rule, lines):
+            self._keep(batch, state, unit)
+
+    def _passes(self, state: State, rule: Rule, lines: Iterable[int]) -> bool:
+        """Whether the filters of one of these lines agree; each that does remembers the state."""
+        passed = False
+        for number in lines:
+            line = rule.lines[number]
+            if not line.filters:
+                passed = True
+                continue
+            new = Kept(state.kind, state.num, state.text, state.time)
+            if line.lets(new, self._before(state, number)):
+                self._passed[state.item, number] = new
+                passed = True
+        return passed
+
+    def _before(self, state: State, number: int) -> Kept | None:
+        """What passed a line last; after a start what was stored last."""
+        stored = self._stored.get(state.item)
+        if (passed := self._passed.get((state.item, number))) is not None or stored is None:
+            return passed
+        return Kept(state.kind, stored.num, stored.text or "", stored.time)
+
+    def _keep(self, batch: Batch, state: State, unit: str | None) -> None:
+        sample = rows.sample(state, unit)
         if not rows.fits(state, unit):
             self._count_mismatch(state, unit)
-        self._last[state.item] = value
+        self._stored[state.item] = sample
         batch.samples.append(sample)
 
     def _count_mismatch(self, state: State, unit: str | None) -> None:

@@ -16,21 +16,25 @@ from pathlib import Path
 from pydantic import Field, SecretStr, field_validator
 
 from services import topics
-from services.bus import Message
+from services.bus import SESSION_TOPIC, Message
 from services.errors import BadMessage, ConfigError, Unavailable
 from services.home import Home
-from services.persistence import rows, strategies
+from services.persistence import broker, rows, rulebook, strategies
 from services.persistence.connection import Connection
 from services.persistence.decisions import Decisions
-from services.persistence.strategies import Restore
+from services.persistence.seen import Seen
+from services.persistence.strategies import Restore, Rule, Timetable
 from services.runner import Post
 from services.section import Section
 from services.storage import Address, Batch, Row, Storage, open_storage, read_address
 
 log = logging.getLogger(__name__)
 
+DIAGNOSTIC_EVERY_S = 1.0
+ABOUT_BROKER = (*broker.FILTERS, SESSION_TOPIC)
 CLOCK_STEP_US = 1_000_000  # a clock that steps back more than this is told
-COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "restored", "reconnects")
+COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "restored", "reconnects", "redelivered",
+            "broker_dropped", "sessions_lost")  # fmt: skip
 
 
 class Config(Section):
@@ -40,7 +44,9 @@ class Config(Section):
     password: SecretStr | None = None  # of the database's user
     view_database: str = "OpenHAB"  # where the views with OpenHAB's layout go (MariaDB, MySQL)
     restore_after_s: float = Field(default=2.0, ge=0)  # how long the broker may take for its retained states
+    broker_queue: int = Field(default=1_000_000, ge=1)  # the broker's max_queued_messages, as in mosquitto.conf
     name: str = "persistence"
+    strategies: Path | None = None  # persistence.yaml; without it `persist` of each item in home.yaml says when
     home: Home
     folder: Path = Path()
 
@@ -59,15 +65,27 @@ class Config(Section):
         password = self.password.get_secret_value() if self.password else None
         return read_address(self.url, password=password, view_database=self.view_database, folder=self.folder)
 
+    @property
+    def rules(self) -> dict[str, Rule]:
+        """The rule of every item; ConfigError when the file of strategies has faults."""
+        return rulebook.rules(self.home, self.folder / self.strategies if self.strategies else None)
+
+
+def check(config: Config) -> None:
+    """ConfigError with every fault of the strategies."""
+    if faults := list(strategies.faults(config.home)):
+        raise ConfigError(faults)
+    assert config.rules is not None
+
 
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[Persistence]:
     """The service; ConfigError when its database cannot be used. One that is away is waited for in the turns."""
-    if faults := list(strategies.faults(config.home)):
-        raise ConfigError(faults)
+    check(config)
     address = config.address
     service = Persistence(config, lambda: open_storage(address))
     service.connection.first()
+    service.prepare()
     try:
         yield service
     finally:
@@ -79,46 +97,99 @@ class Persistence:
 
     def __init__(self, config: Config, opener: Callable[[], Storage]) -> None:
         own_status = topics.SERVICE_STATUS.filter_for(service=config.name)  # its echo shows that there is a broker
-        self.subscribes = (*(row.filter for row in topics.TABLE if row.stored), own_status)
+        stored = (row.filter for row in topics.TABLE if row.stored)
+        self.subscribes = (*stored, own_status, *broker.FILTERS, SESSION_TOPIC)
         self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self.connection = Connection(opener, self.counters)
         self._home = config.home
-        self._decisions = Decisions(config.home, self.counters)
+        rules = config.rules
+        self._timetable = Timetable(rules)
+        self._decisions = Decisions(config.home, rules, self.counters)
         self._restore = Restore(self._decisions.restored, config.restore_after_s)
-        self._gathered: list[rows.State | Row] = []
+        self._gathered: list[tuple[rows.State | Row, Message]] = []
+        self._fresh: list[rows.State | Row] = []  # of it what is not there already
+        self._seen = Seen(config.name)
+        self._name = config.name
+        self._broker = broker.Watch(config.broker_queue, self.counters)
+        self._noted: int | None = None  # of the broker's count of dropped messages, in the database
+        self._next_diagnostic = 0.0
         self._batch = Batch()  # decided, not committed yet
         self._time = 0
         self._learnt = False
+        self._connected = False  # once, in this life
+
+    def prepare(self) -> None:
+        """Learns the last values before the first message, where the database is there: its times go on from those."""
+        if (storage := self.connection.opened) is not None:
+            try:
+                self._learn(storage)
+            except Unavailable as error:
+                log.warning("the database went away at the start: %s", error)
 
     @property
     def due(self) -> float | None:
-        """When the database is tried again, or the restoring is due."""
-        wanted = [when for when in (self.connection.due, self._restore.due) if when is not None]
+        """When the database is tried again, or the restoring or a cron strategy is due."""
+        if self.connection.due is not None:
+            return self.connection.due
+        wanted = [when for when in (self._restore.due, self._timetable.due) if when is not None]
         return min(wanted, default=None)
 
     def handle(self, message: Message, now: float) -> tuple[Message, ...]:
         """Takes a message for the next tick."""
+        if message.topic in ABOUT_BROKER:
+            self._about_broker(message, now)
+            return ()
+        self._broker.came(now)
         known = topics.read(message, now)
         self._restore.begin(now)
-        if known.topic is topics.HOME_STATE and self._restore.saw(known.levels["item"], known.payload):
-            return ()
         row = rows.read(known, self._next_time(message.received or now), self._home) if known.topic.stored else None
-        if row is not None:
-            self._gathered.append(row)
+        if isinstance(row, rows.State) and self._restore.saw(row.item, row.text):
+            self._decisions.heard(row)
+        elif row is not None:
+            self._gathered.append((row, message))
         return ()
 
     def tick(self, now: float) -> list[Message]:
         """Commits what was gathered; Unavailable while the database is away."""
-        storage = self.connection.storage(now)
+        try:
+            storage = self.connection.storage(now)
+        except Unavailable as error:
+            raise Unavailable(f"{error}; {self._broker.waits(now)}") from error
         try:
             self._learn(storage)
             self._decide(storage)
+            if fired := self._timetable.fired(now):
+                self._batch.extend(self._decisions.fired(fired, storage.items, lambda: self._next_time(now)))
             self._commit(storage)
+            self._note(storage)
         except Unavailable as error:
             self.connection.lost(error, now)
             raise
         self.connection.worked()
-        return self._restored(storage, now)
+        self._broker.goes_on()
+        return [*self._restored(storage, now), *self._diagnostic(now)]
+
+    def _about_broker(self, message: Message, now: float) -> None:
+        if message.topic == SESSION_TOPIC:
+            known_before = self._connected or self._seen.any
+            told = self._broker.session(present=message.value is True, known_before=known_before, now=now)
+            self._connected = True
+        else:
+            told = self._broker.heard(message.topic, message.payload, now)
+        if told:
+            log.warning("%s", told)
+
+    def _note(self, storage: Storage) -> None:
+        """The broker's count outlives us: it may drop messages while we are away."""
+        if self._broker.dropped is not None and self._broker.dropped != self._noted:
+            self._noted = self._broker.dropped
+            storage.note(self._name, "dropped", self._noted)
+
+    def _diagnostic(self, now: float) -> list[Message]:
+        if now < self._next_diagnostic:
+            return []
+        self._next_diagnostic = now + DIAGNOSTIC_EVERY_S
+        return [topics.DIAGNOSTICS.message(self._broker.diagnostic(now), component=f"{self._name}/broker")]
 
     def _next_time(self, at: float) -> int:
         """Microseconds, never the same twice and never back: a clock that steps back must not reorder rows."""
@@ -137,32 +208,47 @@ class Persistence:
         last = storage.last_values()
         self._decisions.learn(last, storage.last_diagnostics())
         self._time = max([self._time, *(sample.time for sample in last.values())])
+        self._seen.learn(storage.seen(self._name))
+        self._noted = storage.noted(self._name, "dropped")
+        self._broker.learn(self._noted)
         self._learnt = True
 
     def _decide(self, storage: Storage) -> None:
         """From gathered to decided, once; new items are made before, because MariaDB commits at that."""
-        if self._gathered:
-            storage.add_items(self._decisions.new_items(self._gathered, storage.items))
-            self._batch.extend(self._decisions.batch(self._gathered, storage.items))
-            self._gathered = []
+        for row, message in self._gathered:
+            if self._seen.is_second(message):
+                self.counters["redelivered"] += 1
+            else:
+                self._fresh.append(row)
+        self._gathered = []
+        if self._fresh:
+            storage.add_items(self._decisions.new_items(self._fresh, storage.items))
+            self._batch.extend(self._decisions.batch(self._fresh, storage.items))
+            self._fresh = []
 
     def _commit(self, storage: Storage) -> None:
         if len(self._batch):
+            self._batch.seen = self._seen.turn()
             self.counters["rows"] += self._write(storage, self._batch)
+            self._seen.committed()
             self.counters["batches"] += 1
             self._batch = Batch()
 
     def _write(self, storage: Storage, batch: Batch) -> int:
         """How many rows were written: all, but for one that the database refuses, which halving finds."""
+        written = 0
         try:
             storage.write(batch)
             return len(batch)
         except BadMessage as error:
             if len(batch) > 1:
-                return sum(self._write(storage, half) for half in batch.halves())
-            log.warning("refused by the database: %s: %.200r", error, batch)
-            self.counters["refused"] += 1
-            return 0
+                written = sum(self._write(storage, half) for half in batch.halves())
+            else:
+                log.warning("refused by the database: %s: %.200r", error, batch.samples or batch.rows)
+                self.counters["refused"] += 1
+        if batch.seen is not None:
+            storage.write(Batch(seen=batch.seen))
+        return written
 
     def _restored(self, storage: Storage, now: float) -> list[Message]:
         """The last states of items that the broker does not have, retained, said once."""

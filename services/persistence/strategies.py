@@ -1,63 +1,93 @@
 """When a state is worth a row, and how a start restores it. Pure.
 
-The words are OpenHAB's (`persist` of an item in home.yaml). An update that two strategies want makes one row.
+The words are OpenHAB's. Lines come from `persistence.yaml` (`rulebook.py`), or from `persist` of an item in home.yaml.
+An update that two strategies or two lines want makes one row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from services.home import Home
+from services.persistence.cron import Cron
+from services.persistence.filters import Filter, Kept
 
-STRATEGIES = ("everyChange", "everyUpdate", "restoreOnStartup")
+BUILT_IN = ("everyChange", "everyUpdate", "restoreOnStartup")
 Value = tuple[float | None, str | None]  # number and text of a sample; numbers compare, so 21.50 °C is 21.5 °C
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
-    """What an item's strategies want."""
+class Line:
+    """What one line wants of its items: at a change, at every update, when a cron fires; if its filters agree."""
 
-    change: bool
-    update: bool
+    change: bool = False
+    update: bool = False
+    crons: tuple[tuple[str, Cron], ...] = ()
+    filters: tuple[Filter, ...] = ()
+
+    def wants(self, *, changed: bool, retained: bool) -> bool:
+        """Whether a state that came is to be stored, filters apart.
+
+        A retained message is the broker's snapshot at a (re)connect: it tells nothing unless it differs.
+        """
+        return (self.change and changed) or (self.update and (changed or not retained))
+
+    def lets(self, new: Kept, last: Kept | None) -> bool:
+        """Whether all filters agree."""
+        return all(one.passes(new, last) for one in self.filters)
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What all lines want of one item."""
+
+    lines: tuple[Line, ...]
     restore: bool
 
     @property
     def stores(self) -> bool:
         """Whether the item is ever stored."""
-        return self.change or self.update
+        return any(line.change or line.update or line.crons for line in self.lines)
 
 
 def rule(names: Iterable[str]) -> Rule:
-    """The rule of these strategies."""
+    """The rule of these strategies, of those that are built in."""
     wanted = set(names)
-    return Rule("everyChange" in wanted, "everyUpdate" in wanted, "restoreOnStartup" in wanted)
+    return Rule((Line("everyChange" in wanted, "everyUpdate" in wanted),), "restoreOnStartup" in wanted)
 
 
 UNKNOWN_ITEM = rule(["everyChange"])  # an item that the home's model does not have is kept, but never restored
 
 
-def rules(home: Home) -> dict[str, Rule]:
-    """The rule of every item of the home."""
-    return {name: rule(item.persist) for name, item in home.items.items()}
-
-
 def faults(home: Home) -> Iterator[str]:
-    """The strategies that nobody knows."""
+    """The strategies of the home's items that nobody knows."""
     for name, item in home.items.items():
         for strategy in item.persist:
-            if strategy not in STRATEGIES:
-                yield f"items.{name}.persist: expected of {', '.join(STRATEGIES)}, got {strategy!r}"
+            if strategy not in BUILT_IN:
+                yield f"items.{name}.persist: expected of {', '.join(BUILT_IN)}, got {strategy!r}"
 
 
-def is_wanted(rule: Rule, value: Value, last: Value | None, *, retained: bool) -> bool:
-    """Whether to store a state that came; `last` is the item's last stored value.
+class Timetable:
+    """The cron strategies: which of them fire when. After a pause one fires once, not for all that it missed."""
 
-    A retained message is the broker's snapshot at a (re)connect: it tells nothing unless it differs.
-    """
-    if not rule.stores:
-        return False
-    return value != last or (rule.update and not retained)
+    def __init__(self, rules: Mapping[str, Rule]) -> None:
+        lines = (line for rule in rules.values() for line in rule.lines)
+        self._crons = {name: cron for line in lines for name, cron in line.crons}
+        self._next: dict[str, float] = {}
+
+    @property
+    def due(self) -> float | None:
+        """When the next one fires; None while nothing does."""
+        return min(self._next.values(), default=None)
+
+    def fired(self, now: float) -> set[str]:
+        """The names of those that fire now; the first call begins."""
+        fired = {name for name, due in self._next.items() if now >= due}
+        for name, cron in self._crons.items():
+            if name in fired or name not in self._next:
+                self._next[name] = cron.after(now)
+        return fired
 
 
 class Restore:

@@ -36,6 +36,7 @@ class TrueMount(Section):
     pan_to_tilt_m: XY = (0.0, 0.0)
     tilt_to_lens_m: XY = (0.0, 0.0)
     sensor_roll_deg: float = 0.0
+    tilt_zero_deg: float = 0.0
 
     @property
     def frames(self) -> Mount:
@@ -73,7 +74,7 @@ class WorldCamera(Section):
         out, off = hypot(x, y) - forward, z - away
         side = mount.tilt_to_lens_m[1] * (-1.0 if mount.kind == "ceiling" else 1.0)
         tilt = atan2(off, out) - asin(side / hypot(out, off))
-        return degrees(atan2(y, x)) % 360.0, degrees(tilt)
+        return degrees(atan2(y, x)) % 360.0, degrees(tilt) + mount.tilt_zero_deg
 
     def reaches(self, pan: float, tilt: float) -> bool:
         """Whether the motors can stand at these readings."""

@@ -20,6 +20,7 @@ from services import document
 from services.document import Document, Path_
 from services.errors import ConfigError
 from services.section import Section
+from services.simulators.board import HeldBoard
 from services.simulators.true_camera import XY, XYZ, WorldCamera
 from services.vision.frames import (
     Array,
@@ -151,6 +152,7 @@ class World(Section):
     walls: tuple[Wall, ...]
     furniture: tuple[Furniture, ...] = ()
     markers: tuple[Marker, ...] = ()
+    boards: dict[str, HeldBoard] = Field(default_factory=dict)
     cameras: dict[str, WorldCamera] = Field(default_factory=dict)
     robots: dict[str, WorldRobot] = Field(default_factory=dict)
     map: WorldMap

@@ -10,13 +10,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from services.storage.address import Address, read_address
 
 __all__ = [
-    "Address", "Batch", "CameraOrder", "Diagnostic", "Item", "Row", "Sample", "Scan", "Sighting", "Storage",
-    "open_storage", "read_address",
+    "Address", "Batch", "CameraOrder", "Diagnostic", "Item", "Row", "Sample", "Scan", "SeenTurn", "Sighting", "Storage",
+    "open_plain", "open_storage", "read_address",
 ]  # fmt: skip
 BACKENDS = {"mysql": "services.storage.mysql", "sqlite": "services.storage.sqlite"}
 
@@ -108,6 +108,16 @@ class Diagnostic:
     details: str | None
 
 
+@dataclass(frozen=True, slots=True)
+class SeenTurn:
+    """What keeps a redelivered message from being stored twice; see `services/persistence/seen.py`."""
+
+    client: str
+    slot: int
+    turn: int
+    packets: bytes
+
+
 Row = Sighting | Scan | CameraOrder | Diagnostic
 TABLES: dict[type[Row], str] = {
     Sighting: "sighting",
@@ -128,6 +138,7 @@ class Batch:
 
     samples: list[Sample] = field(default_factory=list)
     rows: list[Row] = field(default_factory=list)
+    seen: SeenTurn | None = None
 
     def __len__(self) -> int:
         return len(self.samples) + len(self.rows)
@@ -138,7 +149,7 @@ class Batch:
         self.rows += other.rows
 
     def halves(self) -> tuple[Batch, Batch]:
-        """The same in two, to find the one row that a database refuses."""
+        """The rows in two, to find the one that a database refuses; `seen` is in neither."""
         s, r = (len(self.samples) + 1) // 2, len(self.rows) // 2
         return Batch(self.samples[:s], self.rows[:r]), Batch(self.samples[s:], self.rows[r:])
 
@@ -150,9 +161,30 @@ class Storage(Protocol):
     tables up to date; ConfigError says why it cannot be used at all (accounts, character set, a newer schema).
     """
 
+    dialect: str  # a key of BACKENDS
+
     @property
     def items(self) -> Mapping[str, Item]:
         """The items that are known, by name."""
+        ...
+
+    def read(self, statement: str) -> list[tuple[Any, ...]]:
+        """The rows of a query in the database's own SQL."""
+        ...
+
+    def change(self, *statements: str) -> int:
+        """Runs statements in one transaction; how many rows the last of them changed."""
+        ...
+
+    def quote(self, text: str) -> str:
+        """A text as a literal of the database's SQL."""
+        ...
+
+    def remake_views(self) -> None:
+        """Makes the views with OpenHAB's layout anew: somebody may have changed or lost them."""
+
+    def seen(self, client: str) -> list[SeenTurn]:
+        """What a writer's last turns handled, in no order."""
         ...
 
     def add_items(self, items: Iterable[Item]) -> None:
@@ -186,6 +218,13 @@ class Storage(Protocol):
         """Where a marker was seen, newest first."""
         ...
 
+    def note(self, client: str, name: str, value: int) -> None:
+        """Keeps a number of a writer's own."""
+
+    def noted(self, client: str, name: str) -> int | None:
+        """The number that was kept; None when none was."""
+        ...
+
     def close(self) -> None:
         """Ends the connection."""
 
@@ -198,4 +237,10 @@ def open_storage(address: Address | str, folder: Path = Path()) -> Storage:
     if isinstance(address, str):
         address = read_address(address, folder=folder)
     storage: Storage = import_module(BACKENDS[address.dialect]).open_address(address)
+    return storage
+
+
+def open_plain(address: Address) -> Storage:
+    """Opens a database that is not ours, or as its administrator: only `read`, `change`, `quote` and `close` work."""
+    storage: Storage = import_module(BACKENDS[address.dialect]).open_plain(address)
     return storage

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib import resources
 
 from services.errors import ConfigError
@@ -33,3 +33,13 @@ def migrate(dialect: str, current: int, apply: Callable[[int, list[str]], None])
     for version, script in known.items():
         if version > current:
             apply(version, script)
+
+
+def back(dialect: str, current: int, to: int) -> Iterator[tuple[int, list[str]]]:
+    """The versions to take back, newest first, each with its statements; ConfigError when one has no way back."""
+    folder = resources.files("services.storage").joinpath("schema")
+    for version in range(current, to, -1):
+        file = folder.joinpath(f"{dialect}_{version:03d}_down.sql")
+        if not file.is_file():
+            raise ConfigError([f"schema version {version} cannot be taken back"])
+        yield version, statements(file.read_text(encoding="utf-8"))

@@ -7,6 +7,8 @@ that one only. Each connection speaks UTC; readers see their own time zone. The 
 from __future__ import annotations
 
 import logging
+import random
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -15,7 +17,7 @@ import pymysql
 from pymysql import err
 
 from services.errors import BadMessage, ConfigError, Unavailable
-from services.storage import Address, Batch, Diagnostic, Item, Sample, Sighting
+from services.storage import Address, Batch, Diagnostic, Item, Sample, SeenTurn, Sighting
 from services.storage import mysql_text as sql
 from services.storage.migrate import migrate
 
@@ -24,7 +26,8 @@ log = logging.getLogger(__name__)
 CONNECT_TIMEOUT_S = 5
 ANSWER_TIMEOUT_S = 30  # without one a pulled cable would hang for ever
 SESSION = "SET time_zone='+00:00', innodb_lock_wait_timeout=5"
-DEADLOCK = 1213  # this transaction was chosen to give way; at COMMIT where Galera runs
+DEADLOCK = {1205, 1213}  # a lock that waited too long; a transaction chosen to give way (at COMMIT with Galera)
+DEADLOCK_PAUSE_S = (0.01, 0.1)
 DEADLOCK_TRIES = 5
 NO_ACCESS = {1044, 1045, 1049, 1142, 1227, 1698}  # no rights, wrong password, no such database
 BAD_VALUE = {1048, 1264, 1265, 1292, 1366, 1367, 1406, 1441}  # NULL, out of range, bad time, bad text, too long
@@ -57,13 +60,19 @@ def open_address(address: Address) -> MysqlStorage:
     return storage
 
 
+def open_plain(address: Address) -> MysqlStorage:
+    """Connects to a database of somebody else, or as its administrator: nothing is made, checked or learnt."""
+    with _translated(opening=True):
+        return MysqlStorage(address, _connect(address))
+
+
 def _connect(address: Address) -> pymysql.Connection[Any]:
     tls: dict[str, Any] = {}
     if address.ssl_ca:
         tls = {"ssl_ca": address.ssl_ca, "ssl_verify_cert": True, "ssl_verify_identity": True}
     return pymysql.connect(
         host=address.host, port=address.port, unix_socket=address.socket, user=address.user,
-        password=address.password or "", database=address.database, charset="utf8mb4", init_command=SESSION,
+        password=address.password or "", database=address.database or None, charset="utf8mb4", init_command=SESSION,
         autocommit=False, local_infile=False, connect_timeout=CONNECT_TIMEOUT_S, read_timeout=ANSWER_TIMEOUT_S,
         write_timeout=ANSWER_TIMEOUT_S, **tls,
     )  # fmt: skip
@@ -71,6 +80,8 @@ def _connect(address: Address) -> pymysql.Connection[Any]:
 
 class MysqlStorage:
     """See `Storage` for what each method promises."""
+
+    dialect = "mysql"
 
     def __init__(self, address: Address, connection: pymysql.Connection[Any]) -> None:
         self._address = address
@@ -96,14 +107,51 @@ class MysqlStorage:
 
     def write(self, batch: Batch) -> None:
         """See `Storage`. A deadlock repeats the whole transaction."""
+        self.change(*sql.inserts(batch, self._items, self._connection.escape))
+
+    def change(self, *statements: str) -> int:
+        """See `Storage`. A deadlock, or a lock that waited too long, repeats the whole transaction."""
         for attempt in range(1, DEADLOCK_TRIES + 1):
             try:
                 with _translated():
-                    self._transaction(list(sql.inserts(batch, self._items, self._connection.escape)))
-                return
+                    return self._transaction(statements)
             except Unavailable as error:
                 if attempt == DEADLOCK_TRIES or not _is_deadlock(error):
                     raise
+                time.sleep(random.uniform(*DEADLOCK_PAUSE_S))
+        raise AssertionError("the last attempt raises or returns")
+
+    def read(self, statement: str) -> list[tuple[Any, ...]]:
+        """See `Storage`."""
+        with _translated():
+            return self._rows(statement)
+
+    def seen(self, client: str) -> list[SeenTurn]:
+        """See `Storage`."""
+        escaped = self._connection.escape(client)
+        return [SeenTurn(*row) for row in self.read(f"SELECT {sql.SEEN} FROM mqtt_seen WHERE client={escaped}")]
+
+    def note(self, client: str, name: str, value: int) -> None:
+        """See `Storage`."""
+        names = f"{self.quote(client)},{self.quote(name)}"
+        self.change(f"INSERT INTO mqtt_noted VALUES ({names},{int(value)}) ON DUPLICATE KEY UPDATE value=VALUES(value)")
+
+    def noted(self, client: str, name: str) -> int | None:
+        """See `Storage`."""
+        where = f"client={self.quote(client)} AND name={self.quote(name)}"
+        found = self.read(f"SELECT value FROM mqtt_noted WHERE {where}")
+        return int(found[0][0]) if found else None
+
+    def quote(self, text: str) -> str:
+        """See `Storage`."""
+        return self._connection.escape(text)
+
+    def remake_views(self) -> None:
+        """See `Storage`."""
+        with _translated():
+            self._connection.query(sql.items_view(self._address.database, self._address.view_database))
+            for item in self._items.values():
+                self._make_view(item)
 
     def last(self, item: str) -> Sample | None:
         """See `Storage`."""
@@ -112,22 +160,22 @@ class MysqlStorage:
 
     def last_values(self) -> dict[str, Sample]:
         """See `Storage`."""
-        return {row[0]: Sample(*row) for row in self._read(sql.LAST_VALUES)}
+        return {row[0]: Sample(*row) for row in self.read(sql.LAST_VALUES)}
 
     def last_diagnostics(self) -> dict[str, Diagnostic]:
         """See `Storage`."""
-        return {row[0]: Diagnostic(*row) for row in self._read(sql.LAST_DIAGNOSTICS)}
+        return {row[0]: Diagnostic(*row) for row in self.read(sql.LAST_DIAGNOSTICS)}
 
     def samples(
         self, item: str, *, since: int | None = None, until: int | None = None, limit: int | None = None
     ) -> list[Sample]:
         """See `Storage`."""
-        rows = self._read(sql.samples(item, since, until, limit, self._connection.escape))
+        rows = self.read(sql.samples(item, since, until, limit, self._connection.escape))
         return [Sample(*row) for row in reversed(rows)]
 
     def sightings(self, marker: int, limit: int) -> list[Sighting]:
         """See `Storage`."""
-        return [Sighting(*row) for row in self._read(sql.sightings(marker, limit))]
+        return [Sighting(*row) for row in self.read(sql.sightings(marker, limit))]
 
     def close(self) -> None:
         """See `Storage`."""
@@ -136,20 +184,18 @@ class MysqlStorage:
 
     # -- the connection
 
-    def _transaction(self, statements: list[str]) -> None:
+    def _transaction(self, statements: Iterable[str]) -> int:
         """All or nothing: a lock that waited too long leaves the transaction open, with half a batch in it."""
         try:
+            changed = 0
             for statement in statements:
-                self._connection.query(statement)
+                changed = self._connection.query(statement)
             self._connection.commit()
+            return changed
         except (err.DataError, err.IntegrityError, err.OperationalError):
             if self._connection.open:
                 self._connection.rollback()
             raise
-
-    def _read(self, statement: str) -> list[tuple[Any, ...]]:
-        with _translated():
-            return self._rows(statement)
 
     def _rows(self, statement: str) -> list[tuple[Any, ...]]:
         """What a query gives; the snapshot that it opened is ended again."""
@@ -222,4 +268,4 @@ def _differs(wanted: Item, known: Item | None) -> bool:
 
 def _is_deadlock(error: Unavailable) -> bool:
     cause = error.__cause__
-    return isinstance(cause, err.MySQLError) and bool(cause.args) and cause.args[0] == DEADLOCK
+    return isinstance(cause, err.MySQLError) and bool(cause.args) and cause.args[0] in DEADLOCK

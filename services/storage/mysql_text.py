@@ -35,6 +35,7 @@ DUPLICATE = {  # MariaDB assigns from left to right, so the column that decides 
     + ", ended=COALESCE(ended,VALUES(ended))",
 }
 COLUMNS = {table: tuple(field.name for field in fields(row)) for row, table in TABLES.items()}
+SEEN = "client, slot, turn, packets"
 MICROSECONDS = "CAST(UNIX_TIMESTAMP({})*1000000 AS SIGNED)"
 SAMPLE = f"i.name, {MICROSECONDS.format('s.time')}, s.num, s.text"
 # One look into the key per item. The usual join with the grouped maximum is as fast while the server's statistics
@@ -79,6 +80,13 @@ def inserts(batch: Batch, items: Mapping[str, Item], escape: Escape) -> Iterator
     for row, table in TABLES.items():
         rows = (other for other in batch.rows if type(other) is row)
         yield from _insert(table, COLUMNS[table], (_values(other, COLUMNS[table], escape) for other in rows))
+    if batch.seen is not None:
+        seen = batch.seen
+        values = f"{escape(seen.client)},{seen.slot},{seen.turn},x'{seen.packets.hex()}'"
+        yield (
+            f"INSERT INTO mqtt_seen ({SEEN}) VALUES ({values}) "
+            "ON DUPLICATE KEY UPDATE turn=VALUES(turn), packets=VALUES(packets)"
+        )
 
 
 def _values(row: Any, columns: tuple[str, ...], escape: Escape) -> str:

@@ -13,7 +13,7 @@ from dataclasses import astuple, fields
 from typing import Any
 
 from services.errors import BadMessage, ConfigError, Unavailable
-from services.storage import FINAL_STATES, TABLES, Address, Batch, Diagnostic, Item, Sample, Sighting
+from services.storage import FINAL_STATES, TABLES, Address, Batch, Diagnostic, Item, Sample, SeenTurn, Sighting
 from services.storage.migrate import migrate
 
 BUSY_S = 5.0
@@ -81,8 +81,18 @@ def open_address(address: Address) -> SqliteStorage:
     return storage
 
 
+def open_plain(address: Address) -> SqliteStorage:
+    """Opens a file of somebody else: nothing is made, checked or learnt. It must be there."""
+    if not address.path.is_file():
+        raise ConfigError([f"expected a database file, there is no {address.path}"])
+    with _translated(opening=True):
+        return SqliteStorage(sqlite3.connect(address.path, timeout=BUSY_S, isolation_level=None))
+
+
 class SqliteStorage:
     """See `Storage` for what each method promises."""
+
+    dialect = "sqlite"
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._connection = connection
@@ -121,6 +131,47 @@ class SqliteStorage:
             )
             for row in batch.rows:
                 self._connection.execute(INSERT[TABLES[type(row)]], astuple(row))
+            if batch.seen is not None:
+                self._connection.execute("REPLACE INTO mqtt_seen VALUES (?, ?, ?, ?)", astuple(batch.seen))
+
+    def read(self, statement: str) -> list[tuple[Any, ...]]:
+        """See `Storage`."""
+        with _translated():
+            return self._rows(statement)
+
+    def change(self, *statements: str) -> int:
+        """See `Storage`."""
+        changed = 0
+        with _translated(), self._transaction():
+            for statement in statements:
+                changed = self._connection.execute(statement).rowcount
+        return changed
+
+    def seen(self, client: str) -> list[SeenTurn]:
+        """See `Storage`."""
+        with _translated():
+            return [SeenTurn(*row) for row in self._rows("SELECT * FROM mqtt_seen WHERE client=?", client)]
+
+    def note(self, client: str, name: str, value: int) -> None:
+        """See `Storage`."""
+        names = f"{self.quote(client)},{self.quote(name)}"
+        self.change(f"REPLACE INTO mqtt_noted VALUES ({names},{int(value)})")
+
+    def noted(self, client: str, name: str) -> int | None:
+        """See `Storage`."""
+        where = f"client={self.quote(client)} AND name={self.quote(name)}"
+        found = self.read(f"SELECT value FROM mqtt_noted WHERE {where}")
+        return int(found[0][0]) if found else None
+
+    def quote(self, text: str) -> str:
+        """See `Storage`."""
+        return "'" + text.replace("'", "''") + "'"
+
+    def remake_views(self) -> None:
+        """See `Storage`."""
+        with _translated(), self._transaction():
+            for item in self._items.values():
+                self._make_view(item, item.item_id)
 
     def last(self, item: str) -> Sample | None:
         """See `Storage`."""
@@ -195,6 +246,9 @@ class SqliteStorage:
             "unit=COALESCE(unit, excluded.unit) RETURNING item_id",
             item.name, item.kind, item.unit,
         )  # fmt: skip
+        self._make_view(item, item_id)
+
+    def _make_view(self, item: Item, item_id: int) -> None:
         value = VIEW_VALUES.get(item.kind, "text")
         shown = "num IS NOT NULL" if item.kind in VIEW_VALUES else "text NOT IN ('UNDEF','NULL')"
         self._connection.execute(f'DROP VIEW IF EXISTS "Item{item_id}"')

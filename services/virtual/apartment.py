@@ -13,6 +13,7 @@ from services.aside import Aside
 from services.bus.memory import Hub, MemoryBus
 from services.camera.address import Address
 from services.camera.brands.amcrest import Amcrest
+from services.camera.calibration.study import Studio
 from services.camera.program import eye
 from services.camera.scan.analysis import Inline
 from services.camera.service import CameraService
@@ -24,6 +25,7 @@ from services.runner import Post, Runner
 from services.simulators.camera.program import Inside, inside
 from services.simulators.camera.settings import Config as CameraSimulator
 from services.topics import CAMERA_ORDER_RESULT, CAMERA_STATUS, SERVICE_STATUS, read
+from services.virtual.film import Film
 from services.virtual.link import Lane, Link
 from services.virtual.wire import Wire
 
@@ -41,6 +43,8 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         self.client = Client(MemoryBus(self.hub))
         self.client.subscribe("#")
         self.links: list[Link] = []
+        self.insides: dict[str, Inside] = {}  # by camera: what is true of it
+        self.films: dict[str, Film] = {}
         self._stack = ExitStack()
         instances = self.apartment.instances.values()
         self.runners = [self._runner(one) for one in instances if one.row.on_bus]
@@ -98,6 +102,15 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         self.client.say(topic, payload)
         return ended[0] if self.until(over, seconds) else None
 
+    def restart(self, name: str) -> None:
+        """A service dies without a word and is begun anew, as the supervisor would do it; a camera's motors go on."""
+        index = next(at for at, runner in enumerate(self.runners) if runner.name == name)
+        dead = self.runners[index].bus
+        assert isinstance(dead, MemoryBus)
+        dead.lose()
+        self.hub.clients.remove(dead)
+        self.runners[index] = self._runner(self.apartment.instances[name])
+
     def _settle(self) -> None:
         """Turns until nobody has anything to do at this moment."""
         busy = True
@@ -124,7 +137,12 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
         gate = Gate(clock=self.clock, pause=lambda seconds: None)
         link = Link(*(self._lane(behind, config.address, post, gate) for _ in range(2)))
         self.links.append(link)
-        return CameraService(config, link, lambda: Inline(post), eye(config))
+        sender = Studio(link, post, self.clock, at_once=True)
+        service = CameraService(config, sender, lambda: Inline(post), eye(config))
+        self.insides[config.name] = behind
+        if simulator.rtsp_port is not None:
+            service.scanner.moving = self.films[config.name] = Film(behind, self.clock)
+        return service
 
     def _lane(self, behind: Inside, address: Address, post: Post, gate: Gate) -> Lane:
         wire = Wire(behind)

@@ -54,6 +54,7 @@ class Mount:
     pan_to_tilt_m: tuple[float, float] = (0.0, 0.0)
     tilt_to_lens_m: tuple[float, float] = (0.0, 0.0)
     sensor_roll_deg: float = 0.0
+    tilt_zero_deg: float = 0.0  # the tilt reading at which the optical axis is level, the base being so
 
 
 def rotation_x(angle_deg: float) -> Array:
@@ -88,7 +89,7 @@ def camera_in_base(mount: Mount, pan_deg: float, tilt_deg: float) -> Transform:
     up = -1.0 if mount.kind == "ceiling" else 1.0  # z of the head that is up in the upright picture
     pan = Transform(rotation_z(pan_deg), np.zeros(3))
     forward, away = mount.pan_to_tilt_m
-    tilt = Transform(rotation_y(-tilt_deg), np.array([forward, 0.0, away]))
+    tilt = Transform(rotation_y(mount.tilt_zero_deg - tilt_deg), np.array([forward, 0.0, away]))
     along, above = mount.tilt_to_lens_m
     axes = np.array([[0.0, 0.0, 1.0], [-up, 0.0, 0.0], [0.0, -up, 0.0]])  # columns: right, down, forward
     lens = Transform(axes @ rotation_z(mount.sensor_roll_deg), np.array([along, 0.0, up * above]))
@@ -98,6 +99,12 @@ def camera_in_base(mount: Mount, pan_deg: float, tilt_deg: float) -> Transform:
 def camera_in_apartment(mount: Mount, pan_deg: float, tilt_deg: float) -> Transform:
     """`T_AC`: the camera at these readings, in the apartment frame."""
     return base_in_apartment(mount) @ camera_in_base(mount, pan_deg, tilt_deg)
+
+
+def axes_in_apartment(mount: Mount, pan_deg: float, tilt_deg: float) -> Array:
+    """The axes that pan and tilt turn the camera about at these readings: two unit vectors, rows, in the apartment."""
+    base = base_in_apartment(mount).rotation
+    return np.array([base[:, 2], base @ rotation_z(pan_deg)[:, 1]])
 
 
 def quaternion(rotation: Array) -> tuple[float, float, float, float]:

@@ -1,7 +1,7 @@
 """The bridge as a program of its own, for tests with a real ROS master: rospy's node exists once per process.
 
 Bus messages come as JSON lines on standard input, what the service publishes goes out as JSON lines. Arguments:
-the configuration as JSON. It ends with the end of its input, and logs to `bridge.log` in ROS_HOME.
+the configuration as JSON. It ends with the end of its input, and logs to `bridge.log` (or $BRIDGE_LOG) in ROS_HOME.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import threading
 import time
 
 from services.bridge import Config, start
-from services.bridge.service import Bridge
+from services.bridge.service import Bridge, GivenUp
 from services.bus import Message
 from services.errors import BadMessage
 
@@ -24,10 +24,18 @@ Inbox = queue.SimpleQueue[Message | None]
 
 def main() -> None:
     config = Config.model_validate_json(sys.argv[1])
-    log = os.path.join(os.environ["ROS_HOME"], "bridge.log")
+    log = os.path.join(os.environ["ROS_HOME"], os.environ.get("BRIDGE_LOG", "bridge.log"))
     logging.basicConfig(filename=log, level=logging.INFO, format="%(levelname)s %(filename)s %(message)s")
     inbox: Inbox = queue.SimpleQueue()
     threading.Thread(target=listen, args=(inbox,), daemon=True).start()
+    try:
+        turns(config, inbox)
+    except GivenUp as error:
+        logging.error("%s", error)
+        sys.exit(1)
+
+
+def turns(config: Config, inbox: Inbox) -> None:
     with start(config, inbox.put) as service:
         while True:
             try:

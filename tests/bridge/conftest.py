@@ -24,12 +24,12 @@ PATIENCE_S = 30.0  # for things that take a second on a quiet machine
 class BridgeProcess:
     """The bridge under test with an item for each of `states`; what it says to the bus is in `said`."""
 
-    def __init__(self, env: dict[str, str], items: dict[str, Any], **config: Any) -> None:
+    def __init__(self, env: dict[str, str], items: dict[str, Any], log: str = "bridge.log", **config: Any) -> None:
         config = {"home": {"items": items}, "cameras": ["ip1"], "folder": str(ROOT / "config"), **config}
         self.said: list[tuple[float, str, str]] = []
         self.process = subprocess.Popen(
             [sys.executable, "-m", "tests.bridge.bridge_process", json.dumps(config)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, **env}, cwd=ROOT,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, **env, "BRIDGE_LOG": log}, cwd=ROOT,
         )  # fmt: skip
         self._heard = threading.Condition()
         threading.Thread(target=self._listen, daemon=True).start()

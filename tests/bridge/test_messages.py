@@ -13,7 +13,7 @@ from services.errors import BadMessage
 pytestmark = pytest.mark.ros
 pytest.importorskip("genpy", reason="apt-get install python3-genpy and message packages")
 
-from services.bridge.messages import build, faults, fields_of, message_class  # noqa: E402
+from services.bridge.messages import build, faults, fields_of, message_class, on_the_wire  # noqa: E402
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_a_field_becomes_what_its_type_wants(kind: str, fields: Any, path: str, 
 )
 def test_a_field_that_does_not_fit_is_named(kind: str, fields: Any, told: str) -> None:
     with pytest.raises(BadMessage, match=told):
-        build(message_class(kind), fields)
+        on_the_wire(build(message_class(kind), fields))
 
 
 def test_a_message_becomes_plain_fields() -> None:

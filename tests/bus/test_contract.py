@@ -299,6 +299,8 @@ def test_a_durable_client_gets_what_it_has_not_acknowledged_again(kit: Kit) -> N
     again = until(lambda: [m for m in durable.receive(0.05) if m.payload == b"not done"], durable)
     durable.ack(again)
     assert len(again) == 1
+    assert not held[0].token.again
+    assert (again[0].token.packet, again[0].token.again) == (held[0].token.packet, True)
 
 
 def test_response_topic_and_correlation_travel_where_the_broker_knows_them(kit: Kit) -> None:

@@ -6,8 +6,11 @@ Computed from the true constants of whatever camera it is, outside the product. 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
+
+Pose = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -26,9 +29,55 @@ def alone(distance: float, speed: float, acceleration: float) -> float:
     return distance / speed + speed / acceleration
 
 
-def least_time(here: tuple[float, float, float], goal: tuple[float, float, float], constants: Constants) -> float:
+def least_time(here: Pose, goal: Pose, constants: Constants) -> float:
     """Seconds from one pose to another, both as readings."""
     middle = sum(constants.dead_arc) / 2
     pans = [pan % 360 if pan % 360 <= middle else pan % 360 - 360 for pan in (here[0], goal[0])]
     ways = (abs(pans[1] - pans[0]), abs(goal[1] - here[1]), abs(goal[2] - here[2]))
     return max(map(alone, ways, constants.speeds, constants.accelerations))
+
+
+@dataclass(frozen=True)
+class ScanBound:
+    """What a scan needs at least: `tour` of motion, `frames` of exposure, `switches` of the picture's mode, seconds."""
+
+    tour: float
+    frames: float
+    switches: float
+
+    @property
+    def seconds(self) -> float:
+        """All of it."""
+        return self.tour + self.frames + self.switches
+
+
+def least_scan(
+    here: Pose, places: Sequence[Pose], constants: Constants, *, turns: int, frames: int, fps: float, switch_s: float
+) -> ScanBound:
+    """Every place seen in `turns` picture modes, `frames` each, from a camera that looks `here`; all in no time else.
+
+    The best of two ways: one tour with a switch at each place, or tours there and back with a switch at each end (none
+    needs a way, and the first mode is there already). Settling is none: a frame may be exposed as soon as all stands.
+    """
+    exposed = len(places) * turns * frames / fps
+    once, again = _best_tour(here, places, constants, 1), _best_tour(here, places, constants, turns)
+    there_and_back = ScanBound(again, exposed, (turns - 1) * switch_s)
+    at_each = ScanBound(once, exposed, (turns - 1) * len(places) * switch_s)
+    return min(there_and_back, at_each, key=lambda bound: bound.seconds)
+
+
+def _best_tour(here: Pose, places: Sequence[Pose], constants: Constants, turns: int) -> float:
+    """The quickest open tour through all, the ways between places as often as there are turns; all orders are tried."""
+    ways = [[least_time(a, b, constants) for b in places] for a in places]
+    begin = [least_time(here, place, constants) for place in places]
+
+    def onward(last: int, left: frozenset[int], least: dict[tuple[int, frozenset[int]], float]) -> float:
+        if not left:
+            return 0.0
+        if (last, left) not in least:
+            least[last, left] = min(turns * ways[last][to] + onward(to, left - {to}, least) for to in left)
+        return least[last, left]
+
+    known: dict[tuple[int, frozenset[int]], float] = {}
+    every = frozenset(range(len(places)))
+    return min(begin[first] + onward(first, every - {first}, known) for first in every)

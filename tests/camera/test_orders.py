@@ -409,8 +409,17 @@ def test_calibrating_turns_the_camera_and_a_stop_ends_it(here: Here) -> None:
     assert not here.door.moving
 
 
+def test_a_lens_calibration_looks_at_pictures_meanwhile_and_a_stop_ends_it(here: Here) -> None:
+    """What a person and a board, or markers, make of it is tried in virtual time."""
+    here.give("CalibrateLens", "True")
+    here.bus.payload("camera/ip1/calibration", lambda told: told.said == "no board is seen yet", 30.0)
+    here.give("Move", "Stop")
+    here.bus.payload("camera/ip1/calibration", lambda told: told.state == "cancelled", 20.0)
+
+
 def test_every_order_is_tried() -> None:
-    tried = {case.key for case in CASES} | {"CalibratePtz"}
+    in_virtual_time = {"CalibratePtz", "CalibrateLens", "CalibrateMount", "CalibrateZoom", "SetCameraInfo"}
+    tried = {case.key for case in CASES} | in_virtual_time
     assert tried == {name for name, _ in orders.KEYS.values()} | {"Position"}
 
 

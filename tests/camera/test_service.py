@@ -206,12 +206,12 @@ def test_a_scan_finds_the_marker_and_publishes_its_place(flat: Flat) -> None:
     assert [one["progress"] for one in states] == sorted(one["progress"] for one in states)
 
 
-def test_a_scan_that_finds_nothing_visits_every_place_and_is_done(flat: Flat) -> None:
+def test_a_scan_that_finds_nothing_visits_every_place_in_both_picture_modes_and_is_done(flat: Flat) -> None:
     flat.order("Scan", {"targets": [17], "places": ["Sofa", "Kitchen"]})
     flat.until(flat.ended)
     assert flat.states() == LIFE
     assert flat.payloads("scan/result") == []
-    assert flat.payloads("scan/state")[-1]["frames_taken"] == 8
+    assert flat.payloads("scan/state")[-1]["frames_taken"] == 16
     assert [place for place in dict.fromkeys(one["place"] for one in flat.payloads("scan/state")) if place] == [
         "Sofa",
         "Kitchen",

@@ -41,7 +41,8 @@ WANTED = [
 def test_a_state_is_stored_as_its_strategies_say(
     names: tuple[str, ...], value: Value, last: Value | None, retained: bool, stored: bool
 ) -> None:
-    assert strategies.is_wanted(strategies.rule(names), value, last, retained=retained) is stored
+    (line,) = strategies.rule(names).lines
+    assert line.wants(changed=value != last, retained=retained) is stored
 
 
 def test_strategies_that_nobody_knows_are_told() -> None:

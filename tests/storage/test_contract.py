@@ -189,7 +189,7 @@ def test_what_was_written_is_there_for_the_next_who_opens(storage: Storage, data
     again = open_storage(database.address)
     assert again.last("Lab_Temp") == Sample("Lab_Temp", T0, 21.5, None)
     assert again.items["Lab_Temp"].unit == "°C"
-    assert database.rows("SELECT version FROM schema_version") == [(1,)]
+    assert database.rows("SELECT MAX(version) FROM schema_version") == [(2,)]
     again.close()
 
 

@@ -5,27 +5,39 @@ The scan itself is `search.py`; looking `analysis.py`; from sightings to places 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterable
 from typing import Literal
 from uuid import uuid4
 
 from services import topics
 from services.bus import Message
 from services.camera.bulletin import Bulletin
-from services.camera.orders import ScanFor
 from services.camera.places import Places
-from services.camera.plan import Plan, attempt
+from services.camera.plan import Plan, wait
 from services.camera.ptz.skill import Skill
-from services.camera.requests import GetPicture, Picture, Refused
+from services.camera.requests import Away, Picture, Refused
 from services.camera.scan import sightings
+from services.camera.scan.album import Album
 from services.camera.scan.analysis import Analysed, Analyst, Task
-from services.camera.scan.search import Frame, Scan, Take, shortest, snapshot
-from services.camera.scan.sightings import Eye
-from services.camera.scan.streamed import Streamed
+from services.camera.scan.findings import Findings, Frame
+from services.camera.scan.live import Live
+from services.camera.scan.modes import Modes
+from services.camera.scan.route import shortest
+from services.camera.scan.search import Scan
+from services.camera.scan.sightings import Eye, Sought
+from services.camera.scan.source import Moving, Source
+from services.camera.scan.wish import ScanFor
 from services.camera.settings import Config
-from services.payloads import OrderState, Place, ScanState
+from services.errors import DeviceError
+from services.payloads import OrderState, Place, ScanResult, ScanState
 
 STATE_S = 0.5  # between two states of a scan that runs
+FRESH_S = 2.5  # a reading as old as this still tells where a camera at rest looks
+GATHER_S = 0.1  # between two looks whether frames have come
+RESTORE_S = 5.0  # between two tries to restore the picture
+
+log = logging.getLogger(__name__)
 
 
 class Scanner:
@@ -44,8 +56,15 @@ class Scanner:
         self.routine = config.routine
         self.show = False
         self.picture = Picture(config.picture.flip, config.picture.mirror, "color")
+        self.seen_at: dict[int, str] = {}  # by marker, the place that showed it best
         self.frames = 0
         self.scan: Scan | None = None
+        self.modes = Modes(config.state and config.state / "cameras" / f"{config.name}-picture.json")
+        self.album = Album(config.state and config.state / "cameras" / f"{config.name}-seen", config.hits)
+        self.due: float | None = None  # when frames are to be handed on
+        self.begin: Callable[[Plan[None], float], None] = lambda plan, now: None  # a plan whose end nobody waits for
+        self.moving: Moving | None = None  # another stream than the camera's own: in virtual time
+        self._moving: Moving | None = None
         self._looking: Analyst | None = None
         self._state_at = 0.0
 
@@ -62,39 +81,54 @@ class Scanner:
 
     def plan(self, order: ScanFor, now: float) -> Plan[None]:
         """A new scan."""
-        take = self._take()
+        self.modes.forget()
+        self.album.begin()
+        routine, targets = self._visits(order), order.targets or self.targets
         self.scan = Scan(
             name=uuid4().hex[:12],
-            targets=order.targets or self.targets,
-            routine=self._visits(order),
+            findings=Findings(targets, order.frames or self.config.frames, self.kind),
+            routine=routine,
             limits=self.config.limits,
             skill=self.skill,
             began=now,
-            frames=self.config.frames,
-            settle_s=self.config.settle_s if take is snapshot else 0.0,  # a stream's pictures tell their time
-            stop_early=self.config.stop_early,
+            source=Source(self._stream(), self.skill, self.config.settle_s),
+            modes=self.modes,
+            stop_early=self.config.stop_early and not order.full,
+            second="always" if order.full else self.config.second_turn,
+            mode=self.picture.mode,
+            near=self.bulletin.at_rest(now, FRESH_S),
             move_timeout_s=self.config.move_timeout_s,
-            kind=self.kind,
-            take=take,
+            likely=next(
+                (place for place in map(self.seen_at.get, order.targets or self.targets) if place in routine), None
+            ),
         )
         self._looking = self.analyst()
-        return self._run(self.scan)
+        scan = self.scan
+        return scan.plan(lambda frame, jpeg: self._look(scan, frame, jpeg))
 
     def take(self, analysed: Analysed) -> None:
         """What was found in a frame; nobody's when its scan has ended."""
         if self.scan is None or analysed.scan != self.scan.name:
             return
-        self.scan.add(analysed)
+        self.scan.findings.add(analysed)
+        if analysed.jpeg is not None and analysed.detections:
+            frame = self.scan.findings.taken[analysed.number]
+            markers = sorted({one.marker for one in analysed.detections})
+            self.album.keep(frame.place, self.scan.spots.index(frame.spot), markers, frame.at, analysed.jpeg)
         if analysed.jpeg is not None and self.show:
             self._publish(topics.CAMERA_SCAN_IMAGE.message(analysed.jpeg, cam=self.config.name))
 
     def tick(self, now: float) -> None:
-        """Publishes how far it is."""
+        """Publishes how far it is, and hands on the frames that have come."""
         if self.scan is None:
+            self.due = None
             if self._state_at == 0.0:
                 self._state_at = now
                 self._say(ScanState(state="idle", targets=list(self.targets)))
-        elif now - self._state_at >= STATE_S:
+            return
+        self.due = now + GATHER_S
+        self.scan.gather()
+        if now - self._state_at >= STATE_S:
             self._state_at = now
             self._say(self.scan.state("running", now))
 
@@ -104,7 +138,10 @@ class Scanner:
         self.close()
         if scan is None:
             return
+        scan.source.close()
         self.scan = None
+        if self.modes.changed:
+            self.begin(self.restored(), now)
         if state == "done":
             self._results(scan)
         last: Literal["done", "cancelled", "failed"] = (
@@ -117,17 +154,30 @@ class Scanner:
         if self._looking is not None:
             self._looking.close()
             self._looking = None
+        if self._moving is not None:
+            self._moving.close()
 
-    def _take(self) -> Take:
-        """Where the frames come from."""
-        video, lens = self.bulletin.video, self.eye.lens
-        if self.config.scan_pictures == "snapshot" or video is None or not video.timed:
-            return snapshot
-        return Streamed(video, lens.width / lens.height if lens else None)
+    def restored(self) -> Plan[None]:
+        """The picture as it was before a scan changed it, also one of another life; tried until the camera takes it."""
+        while self.modes.changed and (self.scan is None or self.scan.turn == 1):
+            try:
+                yield from self.modes.leave()
+            except DeviceError as error:
+                log.warning("%s: the picture is not yet as it was: %s", self.config.name, error)
+                if not isinstance(error, Away):
+                    return
+                yield from wait((yield from wait(0.0)) + RESTORE_S)
 
-    def _run(self, scan: Scan) -> Plan[None]:
-        yield from attempt(GetPicture())  # how the frames will be turned, as far as the camera tells
-        yield from scan.plan(lambda frame, jpeg: self._look(scan, frame, jpeg))
+    def _stream(self) -> Moving | None:
+        """The camera's moving picture, where frames are to come from it."""
+        if self.config.scan_pictures == "snapshot":
+            return None
+        if self.moving is not None:
+            self._moving = self.moving
+        elif self._moving is None and self.bulletin.video is not None:
+            lens = self.eye.lens
+            self._moving = Live(self.bulletin.video, lens.width / lens.height if lens else None)
+        return self._moving
 
     def _look(self, scan: Scan, frame: Frame, jpeg: bytes) -> None:
         self.frames += 1
@@ -140,8 +190,10 @@ class Scanner:
             mirror=self.picture.mirror,
             kind=self.kind,
             dictionary=self.config.dictionary,
-            targets=scan.targets,
+            targets=scan.findings.targets,
             draw=self.show,
+            still=id(frame.spot),
+            of=frame.spot.wanted,
         )
         self._looking.submit(task)
 
@@ -149,18 +201,32 @@ class Scanner:
         """The places to visit in their order; Refused when there are none, or one is not known."""
         names = order.places or self.routine
         if names is None:
-            named = self.places.named
-            names = tuple(shortest(named, self.config.limits, self.bulletin.reading))
+            turns = 2 if order.full or self.config.second_turn == "always" else 1
+            names = self._shortest(order.targets or self.targets, turns)
         if not names:
             raise Refused("no places to visit: save some with SaveAs")
         return {self.places.find(name): self.places.get(name) for name in names}
 
+    def _shortest(self, targets: Iterable[int], turns: int) -> tuple[str, ...]:
+        """All places; first the one where a target was seen last, if the scan may end there."""
+        named, first = self.places.named, None
+        if turns == 1 and self.config.stop_early:
+            first = next((self.seen_at[one] for one in targets if self.seen_at.get(one) in named), None)
+        reading = self.bulletin.reading
+        return tuple(shortest(named, self.config.limits, reading, self.skill, first=first, turns=turns))
+
+    def remember(self, result: ScanResult) -> None:
+        """A result, also of another life of this service: where that marker was seen last."""
+        self.seen_at[result.marker] = result.place
+
     def _results(self, scan: Scan) -> None:
-        for marker, seen in sorted(scan.seen.items()):
-            size = self.config.markers.of(marker)
-            result = sightings.result(self.eye, marker, seen, size, scan.name, self.picture.mode)
-            self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
-            self._publish(topics.CAMERA_MARKER.message(result, cam=self.config.name, marker=marker))
+        for marker, seen in sorted(scan.findings.seen.items()):
+            sought = Sought(marker, self.config.markers.of(marker), self.config.markers.prior(marker))
+            results = sightings.results(self.eye, sought, seen, scan.name, scan.findings.mode_of(marker))
+            for result in results:
+                self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
+            self._publish(topics.CAMERA_MARKER.message(results[0], cam=self.config.name, marker=marker))
+            self.remember(results[0])
 
     def _say(self, state: ScanState) -> None:
         self.bulletin.say(topics.CAMERA_SCAN_STATE, state)

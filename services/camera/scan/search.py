@@ -1,193 +1,255 @@
-"""The marker scan as a plan: go to a place, wait for the picture, take frames, go on. They are looked at meanwhile.
+"""The marker scan as a plan: from place to place, frames at each, and a second turn in another picture mode.
 
-The scan stays at the widest zoom: the camera's zoom is digital, so it adds nothing to a full-size picture, and its true
-magnification is not known. Not here: finding markers (`analysis.py`), where they are (`sightings.py`).
+The camera moves on as soon as the frames of a place have been exposed; they arrive and are looked at meanwhile. The
+scan stays at the widest zoom: the camera's zoom is digital, so it adds nothing to a full-size picture.
+Not here: the order of the places (`route.py`), where frames come from (`source.py`), what came out (`findings.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise, permutations
 from typing import Literal, cast
 
-from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.plan import Plan, attempt, wait
+from services.camera.ptz.drive import longest
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.zooming import widest
-from services.camera.requests import Away, Reading, Snapshot
-from services.camera.scan.analysis import Analysed
-from services.camera.scan.sightings import Sighting, between
+from services.camera.requests import Away, GetPicture, Picture, Reading, Refused, Stop
+from services.camera.scan.findings import Findings, Frame
+from services.camera.scan.modes import Modes
+from services.camera.scan.source import Source, Spot
+from services.errors import DeviceError
 from services.payloads import Place, ScanState
-from services.vision.frames import Kind
 
-ANALYSE_S = 30.0  # longest wait for the last frames to be looked at
-WELL = 2  # frames that must show a target before a scan may end early
-NEARER_DEG = 3.0  # a place that looks less nearer than this is not worth the way
-TRIES = 3  # of a picture: the camera sometimes closes without an answer
-PERMUTED = 7  # up to this many places the shortest order is found by trying all
-TILT_COST = 1.7  # tilt turns slower than pan: a degree of it counts as so many
+ANALYSE_S = 30.0  # longest wait for the next frame to be looked at
+LIGHT_S = 1.5  # after a change of the picture's mode it exposes anew: 1 to 2 s
+BACK_S = 180.0  # a camera that went away may be restarting: 40 to 105 s were seen
+PATIENCE = 3  # times that it may go away in one scan
+RESTORED_S = 5.0
+STEP_S = 0.05
 
-
-@dataclass(frozen=True)
-class Frame:
-    """When and where a picture was taken, at rest; its bytes are not kept."""
-
-    number: int
-    place: str
-    reading: Reading
-    at: float
-
-
+SecondTurn = Literal["missed", "always", "never"]
 Look = Callable[[Frame, bytes], None]
-Take = Callable[[float, float], Plan[tuple[bytes, float, float]]]
-"""Plans a picture from after a moment, given the time now: its bytes, when it was exposed, and the time then."""
-
-
-def snapshot(after: float, now: float) -> Plan[tuple[bytes, float, float]]:
-    """A Take: asked for now, when the camera has been at rest for a while."""
-    for _ in range(TRIES - 1):
-        reply = yield from attempt(Snapshot())
-        if reply.error is None:
-            return cast(bytes, reply.result), reply.sent, reply.received
-        yield from wait(reply.received + 0.3)
-    reply = yield from ask(Snapshot())
-    return cast(bytes, reply.result), reply.sent, reply.received
 
 
 @dataclass
 class Scan:
-    """One scan: the plan that drives it, and what has come out so far."""
+    """One scan: the plan that drives it. `routine`: the places in their order; `second`: when there is a second turn.
+
+    `likely` is the place that showed a target last; `near` where the camera looks, if that is known.
+    """
 
     name: str
-    targets: tuple[int, ...]
+    findings: Findings
     routine: Mapping[str, Place]
     limits: Limits
     skill: Skill
     began: float
-    frames: int = 4
-    settle_s: float = 0.6
+    source: Source
+    modes: Modes
     stop_early: bool = True
-    kind: Kind = "ceiling"
+    second: SecondTurn = "missed"
+    mode: str = "color"  # as the picture is
     move_timeout_s: float = 60.0
-    take: Take = snapshot
+    likely: str | None = None
+    near: Reading | None = None
     place: str | None = None
-    near: Reading | None = None  # of the place before, where nothing has moved it since
-    taken: list[Frame] = field(default_factory=list)
-    analysed: int = 0
-    seen: dict[int, list[Sighting]] = field(default_factory=dict)
+    turn: int = 1
+    trouble: str = ""  # what it waits for
+    spots: list[Spot] = field(default_factory=list)
+    looks: Look = lambda frame, jpeg: None
+    _lost: int = 0
+    _settles: float = 0.0  # when the picture's light has settled after a change of its mode
+    _far: float = 0.0
 
     def plan(self, look: Look) -> Plan[None]:
         """Visits the places; `look` is handed every frame. Ends when all frames have been looked at.
 
         With `stop_early`, places that can add nothing any more are left out.
         """
-        now, left = self.began, dict(self.routine)
-        while left:
-            self.place = next(iter(left))
-            now = yield from self._visit(left.pop(self.place), now, look)
-            if self.stop_early:
-                now = yield from self._all_analysed(now)
-                left = {name: place for name, place in left.items() if self.worth(place)}
-        yield from self._all_analysed(now)
+        self.looks = look
+        now = yield from self._unchanged(self.began)
+        now = yield from self.source.begin(now)
+        now = yield from self._tour(dict(self.routine), now)
+        if self.second == "always" or (self.second == "missed" and (yield from self._missing(now))):
+            backwards = dict(reversed([(spot.place, self.routine[spot.place]) for spot in self.spots]))
+            if (now := (yield from self._switch(now))) and self.turn == 2:
+                now = yield from self._tour(backwards, now)
+                now = yield from self._first_mode(now)  # while the last frames are on their way
+        now = yield from self._all_there(now)
+        now = yield from self._again(now)
+        self._check()
         self.place = None
 
-    def add(self, analysed: Analysed) -> None:
-        """Takes in what was found in one frame."""
-        self.analysed += 1
-        frame = self.taken[analysed.number]
-        for detection in analysed.detections:
-            if detection.marker in self.targets:
-                sighting = Sighting(detection, frame.place, frame.reading, frame.at, analysed.size)
-                self.seen.setdefault(detection.marker, []).append(sighting)
-
-    def worth(self, place: Place) -> bool:
-        """Whether a place is still to be visited: a target is missing, or it looks nearer to one than any so far."""
-        enough = min(WELL, self.frames)
-        return any(
-            len(self.seen.get(target, ())) < enough or self._nearer(place, self.seen[target]) for target in self.targets
-        )
-
-    def _nearer(self, place: Place, seen: list[Sighting]) -> bool:
-        best = min(seen, key=lambda sighting: sighting.off_centre)
-        there = best.bearing(self.kind)
-        return between(there, (place.pan, place.tilt)) + NEARER_DEG < between(
-            there, (best.reading.pan, best.reading.tilt)
-        )
+    def gather(self) -> None:
+        """Hands on the frames that have come."""
+        for spot, at, jpeg in self.source.collect():
+            self.looks(self.findings.take(spot, at), jpeg)
 
     def state(
         self, state: Literal["running", "done", "cancelled", "failed"], now: float, reason: str = ""
     ) -> ScanState:
-        """How far it is."""
+        """How far it is; while it runs, what was seen in one frame only is not found yet."""
+        found = [one for one in self.findings.seen if state != "running" or self.findings.found(one)]
         return ScanState(
             state=state,
             scan=self.name,
-            targets=list(self.targets),
-            found=sorted(self.seen),
-            turn=1,
+            targets=list(self.findings.targets),
+            found=sorted(found),
+            turn=self.turn,
             place=self.place,
             progress=1.0 if state == "done" else self._progress(),
-            frames_taken=len(self.taken),
-            frames_analysed=self.analysed,
+            frames_taken=len(self.findings.taken),
+            frames_analysed=self.findings.analysed,
             elapsed_s=round(max(0.0, now - self.began), 3),
-            reason=reason,
+            reason=reason or self.trouble,
         )
 
     def _progress(self) -> float:
-        whole = max(1, len(self.routine) * self.frames)
-        return round(min(1.0, (len(self.taken) + self.analysed) / (2 * whole)), 3)
+        turns = 2 if self.second == "always" or self.turn == 2 else 1
+        whole = max(1, len(self.routine) * self.findings.frames * turns)
+        done = (len(self.findings.taken) + self.findings.analysed) / (2 * whole)
+        self._far = max(self._far, round(min(1.0, done), 3))
+        return self._far
 
-    def _visit(self, place: Place, now: float, look: Look) -> Plan[float]:
+    def _tour(self, left: dict[str, Place], now: float) -> Plan[float]:
+        while left:
+            name = next(iter(left))
+            now = yield from self._visit(name, left.pop(name), now)
+            if self.stop_early and name == self.likely:
+                now = yield from self._all_there(now)  # this place may be all
+            if self.stop_early:
+                left = {name: place for name, place in left.items() if self.findings.worth(place)}
+        return now
+
+    def _visit(self, name: str, place: Place, now: float, wanted: int | None = None) -> Plan[float]:
+        """One place; a camera that goes away in between is awaited, and the place is visited once more."""
+        while True:
+            try:
+                return (yield from self._stay(name, place, now, wanted or self.findings.frames))
+            except Away as error:
+                now = yield from self._back(error, now)
+
+    def _stay(self, name: str, place: Place, now: float, wanted: int) -> Plan[float]:
+        self.place = name
+        now = yield from self._go(place, now)
+        if self.stop_early and not self.findings.worth(place):
+            return now  # all was found on the way here
+        if not self.spots:
+            yield from self._ask_picture()
+        since = max(self.source.rested, self._settles)
+        spot = Spot(wanted, since, since == self._settles, place=name, reading=cast(Reading, self.near), mode=self.mode)
+        self.spots.append(spot)
+        try:
+            now = yield from self.source.expose(spot, now)
+        except Away:
+            self.spots.remove(spot)
+            raise
+        self.gather()
+        return now
+
+    def _ask_picture(self) -> Plan[None]:
+        """How the frames will be turned, and in which mode; asked for while the first ones are exposed."""
+        reply = yield from attempt(GetPicture())
+        if isinstance(reply.result, Picture):
+            self.mode = reply.result.mode
+        if self.second == "always":
+            yield from self.modes.note(reply)
+
+    def _go(self, place: Place, now: float) -> Plan[float]:
         goal = self.limits.goal(place.pan, place.tilt, self.limits.zoom[0])
-        until, preset = now + self.move_timeout_s, place.preset
-        presets = {} if preset is None else {preset: (place.pan, place.tilt, place.zoom)}
-        arrival = yield from goto(goal, self.limits, self.skill, until, near=self.near, presets=presets)
+        presets = {} if place.preset is None else {place.preset: (place.pan, place.tilt, place.zoom)}
+        near, self.near = self.near, None
+        here = self.limits.pose(near) if near is not None else goal.pose
+        move = goto(goal, self.limits, self.skill, now + self.move_timeout_s, near=near, presets=presets)
+        arrival = yield from self.source.followed(move, now, longest(self.skill, here, goal.pose))
+        now = yield from self.source.followed(widest(self.limits, self.skill, arrival.at), self.source.rested)
         self.near = arrival.reading
-        now = yield from widest(self.limits, self.skill, arrival.at)
-        now = yield from wait(now + self.settle_s)
-        for _ in range(self.frames):
-            jpeg, at, now = yield from self.take(arrival.at, now)
-            frame = Frame(len(self.taken), self.place or "", arrival.reading, at)
-            self.taken.append(frame)
-            look(frame, jpeg)
         return now
 
-    def _all_analysed(self, now: float) -> Plan[float]:
-        limit = now + ANALYSE_S
-        while self.analysed < len(self.taken):
+    def _switch(self, now: float) -> Plan[float]:
+        """To the second picture mode, where the camera has one."""
+        try:
+            changed = yield from self.modes.enter()
+        except Refused:
+            self.second = "never"
+            return now
+        self.source.leave(now)
+        self.turn, self.mode, self._settles = 2, "bw", changed + LIGHT_S
+        return changed
+
+    def _first_mode(self, now: float) -> Plan[float]:
+        """As the picture was before."""
+        self.source.leave(now)
+        yield from self.modes.leave()
+        now = yield from wait(now)
+        self.mode, self._settles = self.spots[0].mode, now + LIGHT_S
+        return now
+
+    def _unchanged(self, now: float) -> Plan[float]:
+        """Waits a little for the picture to be as it was before the last scan."""
+        until = now + RESTORED_S
+        while self.modes.changed and now < until:
+            now = yield from wait(now + STEP_S)
+        return now
+
+    def _missing(self, now: float) -> Plan[bool]:
+        """Whether the first turn has left a target unseen, when all is looked at."""
+        yield from self._all_there(now)
+        return not self.findings.all_found
+
+    def _back(self, error: Away, now: float) -> Plan[float]:
+        """Waits for a camera that went away, as one does that restarts; it is stopped first. Raises when it stays."""
+        self._lost, self.trouble, self.near = self._lost + 1, f"the camera is away: {error}", None
+        until = now + BACK_S
+        while True:
+            reply = yield from attempt(Stop())
+            if reply.error is None or isinstance(reply.error, Refused):
+                break
+            if self._lost > PATIENCE or reply.received > until or not isinstance(reply.error, Away):
+                raise error if isinstance(reply.error, Away) else reply.error
+            yield from wait(reply.received + 0.5)
+        self.trouble = ""
+        return reply.received
+
+    def _all_there(self, now: float) -> Plan[float]:
+        """Until every frame has come and has been looked at."""
+        limit, done = now + ANALYSE_S, self.findings.analysed
+        self.gather()
+        while self.source.pending(now) or self.findings.analysed < len(self.findings.taken):
+            if self.findings.analysed > done:
+                limit, done = now + ANALYSE_S, self.findings.analysed
             if now > limit:
-                raise Away("the frames were not looked at in time")
-            now = yield from wait(now + 0.05)
+                raise DeviceError("the frames are not looked at: no worker answers")
+            now = yield from wait(now + STEP_S)
+            self.gather()
         return now
 
+    def _again(self, now: float) -> Plan[float]:
+        """Visits once more the places of which frames are missing: the stream stood still, or some were broken."""
+        short = [spot for spot in self.spots if spot.got < spot.wanted and self._needed(spot)]
+        for spot in sorted(short, key=lambda spot: spot.mode != self.mode):
+            if spot.mode != self.mode:
+                now = yield from self._switch(now)
+            missing, spot.wanted = spot.wanted - spot.got, spot.got
+            now = yield from self._visit(spot.place, self.routine[spot.place], now, missing)
+        if not short:
+            return now
+        if self.modes.changed:
+            now = yield from self._first_mode(now)
+        return (yield from self._all_there(now))
 
-def shortest(places: Mapping[str, Place], limits: Limits, reading: Reading | None) -> list[str]:
-    """The names in the order of the shortest open tour from where the camera looks (both axes turn at once).
+    def _needed(self, spot: Spot) -> bool:
+        whole = self.second == "always" or not self.stop_early
+        return whole or (spot.got <= spot.wanted // 2 and self.findings.worth(self.routine[spot.place]))
 
-    All orders are tried for a few places; for more, the nearest comes next and the tour is improved by reversals.
-    """
-    poses = {name: limits.pose(Reading(place.pan, place.tilt, place.zoom)) for name, place in places.items()}
-    here = limits.pose(reading) if reading else None
-
-    def cost(order: Iterable[str]) -> float:
-        way = ([here] if here else []) + [poses[name] for name in order]
-        hops = pairwise(way)
-        return sum(max(abs(a[0] - b[0]), TILT_COST * abs(a[1] - b[1])) for a, b in hops)
-
-    if len(poses) <= PERMUTED:
-        return list(min(permutations(poses), key=cost, default=()))
-    return _improved(sorted(poses, key=lambda name: poses[name]), cost)
-
-
-def _improved(order: list[str], cost: Callable[[Iterable[str]], float]) -> list[str]:
-    """Reverses stretches of the tour while that makes it shorter (2-opt; Croes 1958)."""
-    better = True
-    while better:
-        better = False
-        for start in range(len(order)):
-            for end in range(start + 2, len(order) + 1):
-                other = order[:start] + order[start:end][::-1] + order[end:]
-                if cost(other) < cost(order) - 1e-9:
-                    order, better = other, True
-    return order
+    def _check(self) -> None:
+        """DeviceError when there is a place of which no picture could be read."""
+        seen = {spot.place for spot in self.spots if spot.got > 0}
+        blind = [place for place in dict.fromkeys(spot.place for spot in self.spots) if place not in seen]
+        if blind and not self.findings.all_found:
+            why = next((self.findings.unreadable[one] for one in blind if one in self.findings.unreadable), "none came")
+            raise DeviceError(f"no picture of {', '.join(blind)}: {why}")

@@ -6,7 +6,7 @@ The geometry is in `vision/pose.py` and `vision/frames.py`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import acos, atan2, cos, degrees, hypot, radians, sin
 
 import numpy as np
@@ -14,20 +14,28 @@ import numpy as np
 from services.camera.requests import Reading
 from services.payloads import Point, Quaternion, ScanResult, WeightedQuaternion, stamp
 from services.vision.detect import Detection
-from services.vision.frames import Array, Kind, Mount, camera_in_apartment, quaternion
+from services.vision.frames import Array, Kind, Mount, axes_in_apartment, camera_in_apartment, quaternion
 from services.vision.lens import Lens
-from services.vision.pose import Located, View, locate
+from services.vision.pose import Located, View, locate_each
+from services.vision.prior import Prior
+from services.vision.zoom import WIDEST, Level, Magnification, at_level
+
+WELL_KNOWN = 0.01  # share of the magnification's uncertainty above which no distance is told: 5 cm at 5 m
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """One marker in one frame: `at` when it was taken, `size` of the picture (width, height)."""
+    """One marker in one frame: `at` when it was taken, `size` of the picture (width, height).
+
+    `magnified`: as it was measured against the widest picture from there (`vision/zoom.py`); None: it was not.
+    """
 
     detection: Detection
     place: str
     reading: Reading
     at: float
     size: tuple[int, int]
+    magnified: Magnification | None = None
 
     @property
     def off_centre(self) -> float:
@@ -56,19 +64,53 @@ def between(one: tuple[float, float], other: tuple[float, float]) -> float:
 
 @dataclass(frozen=True)
 class Eye:
-    """What is known of the camera; `lens` or `mount` None: no positions."""
+    """What is known of the camera; `lens` or `mount` None: no positions. `levels`: its calibrated zoom."""
 
     camera: str
     dictionary: str
     lens: Lens | None
     mount: Mount | None
     widest: float = 0.0  # the zoom at which the lens was calibrated
+    levels: tuple[Level, ...] = ()
+    angle_noise_deg: float = 0.05  # standard deviation of a reading
+    mount_doubt: Array | None = None  # covariance (6, 6) of the mount's place (m) and turn (rad, apartment's axes)
+
+    def magnification(self, seen: Sighting) -> Magnification | None:
+        """Of the picture of a sighting: measured, or by the table; None where neither tells it well enough."""
+        if seen.magnified is not None:
+            known: Magnification | None = seen.magnified
+        else:
+            known = WIDEST if seen.reading.zoom <= self.widest else at_level(self.levels, seen.reading.zoom)
+        return known if known is not None and known.relative <= WELL_KNOWN else None
 
 
-def result(eye: Eye, marker: int, seen: Sequence[Sighting], size_m: float, scan: str, mode: str) -> ScanResult:
-    """The result for one marker, from all frames of a scan that show it (at least one)."""
+@dataclass(frozen=True)
+class Sought:
+    """What is known of a marker before it is seen: the side of its black square, and how it hangs or lies."""
+
+    marker: int
+    size_m: float
+    prior: Prior | None = None
+
+
+def results(eye: Eye, sought: Sought, seen: Sequence[Sighting], scan: str, mode: str) -> list[ScanResult]:
+    """The results for one marker, from all frames of a scan that show it (at least one); the newest place first.
+
+    There are several where it was seen at several places at a time. A place that it has left is none.
+    """
+    located, why = _located(eye, sought, seen)
+    if not located:
+        return [_result(eye, sought.marker, seen, scan, mode, why, None)]
+    return [
+        _result(eye, sought.marker, [sightings[index] for index in one.used], scan, mode, None, one)
+        for one, sightings in located
+    ]
+
+
+def _result(
+    eye: Eye, marker: int, seen: Sequence[Sighting], scan: str, mode: str, why: str | None, located: Located | None
+) -> ScanResult:
     best = min(seen, key=lambda sighting: sighting.off_centre)
-    located, why = _located(eye, seen, size_m)
     return ScanResult(
         camera=eye.camera,
         marker=marker,
@@ -85,22 +127,47 @@ def result(eye: Eye, marker: int, seen: Sequence[Sighting], size_m: float, scan:
     )
 
 
-def _located(eye: Eye, seen: Sequence[Sighting], size_m: float) -> tuple[Located | None, str | None]:
+Placed = list[tuple[Located, list[Sighting]]]
+
+
+def _located(eye: Eye, sought: Sought, seen: Sequence[Sighting]) -> tuple[Placed, str | None]:
+    """Where it is, each with the sightings that its views are of; and why there is nothing."""
     if eye.lens is None or eye.mount is None:
-        return None, "the camera has no camera_info" if eye.lens is None else "the camera has no mount"
-    plain = [sighting for sighting in seen if sighting.reading.zoom <= eye.widest]
-    if not plain:
-        return None, f"seen only zoomed in: the lens is calibrated at zoom {eye.widest:g}"
+        return [], "the camera has no camera_info" if eye.lens is None else "the camera has no mount"
+    known = [(sighting, eye.magnification(sighting)) for sighting in seen]
+    measured = [(sighting, magnified) for sighting, magnified in known if magnified is not None]
+    if not measured:
+        return [], f"how much zoom {seen[0].reading.zoom:g} magnifies is not known well enough to tell the distance"
+    views = [_view(eye, eye.lens, eye.mount, sought, sighting, magnified) for sighting, magnified in measured]
     try:
-        return locate([_view(eye.lens, eye.mount, sighting, size_m) for sighting in plain]), None
+        found = [_hung(one, eye.mount, eye.mount_doubt) for one in locate_each(views, sought.prior)]
+        return [(one, [sighting for sighting, _ in measured]) for one in found], None
     except ValueError as error:
-        return None, str(error)
+        return [], str(error)
 
 
-def _view(lens: Lens, mount: Mount, sighting: Sighting, size_m: float) -> View:
-    pose = camera_in_apartment(mount, sighting.reading.pan, sighting.reading.tilt)
-    corners = np.asarray(sighting.detection.corners, float)
-    return View(lens.scaled(*sighting.size), pose, corners, size_m)
+def _hung(located: Located, mount: Mount, doubt: Array | None) -> Located:
+    """With what the mount's own place and turn add: all sights share it, so no number of them takes it away."""
+    if doubt is None:
+        return located
+    x, y, z = located.position - np.array(mount.position)
+    moved = np.hstack((np.eye(3), [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]))  # the marker, by place and turn
+    return replace(located, covariance=located.covariance + moved @ doubt @ moved.T)
+
+
+def _view(eye: Eye, lens: Lens, mount: Mount, sought: Sought, sighting: Sighting, magnified: Magnification) -> View:
+    reading = sighting.reading
+    return View(
+        lens=magnified.through(lens.scaled(*sighting.size)),
+        camera=camera_in_apartment(mount, reading.pan, reading.tilt),
+        corners=np.asarray(sighting.detection.corners, float),
+        size_m=sought.size_m,
+        angle_noise_deg=eye.angle_noise_deg,
+        focal_doubt=magnified.relative,
+        enlarged=max(1.0, magnified.times),
+        axes=axes_in_apartment(mount, reading.pan, reading.tilt),
+        at=sighting.at,
+    )
 
 
 def _geometry(located: Located | None) -> dict[str, object]:

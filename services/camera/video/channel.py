@@ -107,7 +107,7 @@ class Channel:
 
     def begin(self, found: StreamAddress | None) -> None:
         """Reads from there from now on, while it is on."""
-        ways = self._ways(found) if found is not None and self.on else ()
+        ways = self.ways(found) if found is not None and self.on else ()
         if bool(ways) != self.reader.on or found != self.found:
             self.found = found
             self.reader.switch(ways)
@@ -174,7 +174,8 @@ class Channel:
     def _still(self, now: float) -> bool:
         return self.reader.flow.last > 0 and now - self.reader.flow.last > STILL_S
 
-    def _ways(self, found: StreamAddress) -> tuple[Opener, ...]:
+    def ways(self, found: StreamAddress) -> tuple[Opener, ...]:
+        """How to open a stream of the camera that is there, the best way first."""
         ways: list[Opener] = []
         rtsp, mjpeg = found.rtsp, found.mjpeg
         if rtsp is not None:

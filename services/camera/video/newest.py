@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Condition, Lock
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from services.camera.requests import Away
 from services.camera.video import pictures
@@ -57,6 +57,14 @@ class Frame:
         return pictures.encode(self.upright.turn(self.develop()))
 
 
+class Encoded(NamedTuple):
+    """One picture as JPEG; `exposed` in seconds since 1970. Without data it could not be made."""
+
+    number: int
+    data: bytes
+    exposed: float
+
+
 class Newest:
     """The slot. For several threads."""
 
@@ -67,10 +75,11 @@ class Newest:
         self._frame: Frame | None = None
         self._taken = 0  # number of the newest frame that somebody took
         self._watchers = 0
+        self._taps: list[Callable[[Frame], None]] = []
         self._closed = False
         self._changed = Condition()
         self._encoding = Lock()
-        self._encoded: tuple[int, bytes] = (0, b"")
+        self._encoded = Encoded(0, b"", 0.0)
 
     @contextmanager
     def watched(self) -> Iterator[None]:
@@ -82,6 +91,15 @@ class Newest:
         finally:
             with self._changed:
                 self._watchers -= 1
+
+    @contextmanager
+    def tapped(self, see: Callable[[Frame], None]) -> Iterator[None]:
+        """While it lasts, every picture is shown to `see`, on the thread that brings it."""
+        self._taps.append(see)
+        try:
+            yield
+        finally:
+            self._taps.remove(see)
 
     @property
     def wanted(self) -> bool:
@@ -99,8 +117,10 @@ class Newest:
             self.frames += 1
             if self._frame is not None and self._taken < self._frame.number and self.wanted:
                 self.dropped += 1
-            self._frame = Frame(self.frames, develop, exposure, arrived, self.upright, jpeg)
+            self._frame = frame = Frame(self.frames, develop, exposure, arrived, self.upright, jpeg)
             self._changed.notify_all()
+        for see in list(self._taps):
+            see(frame)
 
     @property
     def frame(self) -> Frame | None:
@@ -120,7 +140,7 @@ class Newest:
             self._changed.wait_for(lambda: self._closed or self._newer(number), timeout_s)
             return self._frame if self._newer(number) and not self._closed else None
 
-    def jpeg(self, number: int, timeout_s: float) -> tuple[int, bytes] | None:
+    def jpeg(self, number: int, timeout_s: float) -> Encoded | None:
         """The newest picture after that number, upright, as JPEG; one encoding serves all who ask. None: see wait."""
         end = time.monotonic() + timeout_s
         while (frame := self.wait(number, max(0.0, end - time.monotonic()))) is not None:
@@ -139,12 +159,12 @@ class Newest:
     def _newer(self, number: int) -> bool:
         return self._frame is not None and self._frame.number > number
 
-    def _encode(self, frame: Frame) -> tuple[int, bytes] | None:
+    def _encode(self, frame: Frame) -> Encoded | None:
         with self._encoding:
-            if self._encoded[0] < frame.number:
+            if self._encoded.number < frame.number:
                 self._taken = max(self._taken, frame.number)
-                self._encoded = (frame.number, self._jpeg_of(frame))
-            return self._encoded if self._encoded[1] else None
+                self._encoded = Encoded(frame.number, self._jpeg_of(frame), frame.exposure.at)
+            return self._encoded if self._encoded.data else None
 
     def _jpeg_of(self, frame: Frame) -> bytes:
         try:

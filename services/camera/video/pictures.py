@@ -21,8 +21,17 @@ END, LONGEST_TAIL = b"\xff\xd9", 4096  # bytes that firmware writes behind the e
 
 def decode(jpeg: bytes) -> Image:
     """The picture as BGR (height, width, 3); Away when it is none, or not whole (the camera sends such at times)."""
+    return _decoded(jpeg, cv2.IMREAD_COLOR)
+
+
+def decode_grey(jpeg: bytes) -> Image:
+    """The same in grey (height, width), in three quarters of the time."""
+    return _decoded(jpeg, cv2.IMREAD_GRAYSCALE)
+
+
+def _decoded(jpeg: bytes, how: int) -> Image:
     whole = END in jpeg[-LONGEST_TAIL:]  # of half a JPEG OpenCV makes a picture that is grey below
-    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if whole else None
+    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), how) if whole else None
     if image is None:
         raise Away(f"expected a whole JPEG, got {len(jpeg)} bytes that are none")
     return image.astype(np.uint8, copy=False)
@@ -32,6 +41,17 @@ def encode(image: Image, quality: int = QUALITY) -> bytes:
     """The picture as JPEG."""
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return data.tobytes()
+
+
+def grey(image: Image) -> Image:
+    """The brightness of a picture, (height, width)."""
+    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.uint8, copy=False)
+
+
+def thumbnail(image: Image, width: int) -> bytes:
+    """The picture as a JPEG of that width."""
+    size = (width, max(1, round(image.shape[0] * width / image.shape[1])))
+    return encode(cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False))
 
 
 def upright(image: Image, *, flip: bool, mirror: bool, kind: Literal["ceiling", "shelf"]) -> Image:

@@ -1,6 +1,6 @@
 """Our own stream: the newest picture for everybody who may look, as multipart JPEG, and one picture at a time.
 
-    /camera/<cam>/stream.mjpg     while RTSP or MJPEG is on
+    /camera/<cam>/stream.mjpg     while RTSP or MJPEG is on; X-Timestamp says when each picture was exposed
     /camera/<cam>/snapshot.jpg    always: the newest picture, or a snapshot taken for it
 
 No credentials: loopback and the configured networks may look, all others get 403. Nothing else is served. The standard
@@ -189,9 +189,9 @@ class Viewer(BaseHTTPRequestHandler):
             found = self.server.newest.jpeg(number, QUIET_S)
             if found is None:
                 continue
-            number, data = found
+            number, data, exposed = found
             due = max(due + step, monotonic())
-            head = f"Content-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
+            head = f"Content-Type: image/jpeg\r\nContent-Length: {len(data)}\r\nX-Timestamp: {exposed:.3f}\r\n\r\n"
             self.wfile.write(head.encode() + data + f"\r\n--{BOUNDARY}\r\n".encode())
 
     def _gone(self, within_s: float) -> bool:
@@ -215,7 +215,7 @@ class Viewer(BaseHTTPRequestHandler):
             if newest.wait(number, 0.0) is None and not self.server.ask():
                 return None
             found = newest.jpeg(number, SNAPSHOT_S)
-        return found[1] if found else None
+        return found.data if found else None
 
     def _refuse(self, status: HTTPStatus, why: str, *more: tuple[str, str]) -> None:
         body = f"{status.value} {status.phrase}: {why}\n".encode()

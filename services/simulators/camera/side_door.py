@@ -8,6 +8,7 @@ GET  /log                                requests: time, method, target, status,
 POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand there at once
 POST /event    {"code", "action", "index", "data"}
 POST /stir     {"seconds"}               something moves before the lens for so long
+POST /board    {"name", ...}             somebody holds a board of squares so (`board.py`); a name alone: puts it away
 POST /tone     {"hertz"}                 what the microphone hears
 POST /clock    {"offset_s", "drift_ppm"} the camera's clock is wrong by so much, and gains so many us/s
 POST /card     {"in"}                    whether a memory card is in it
@@ -27,6 +28,7 @@ from dataclasses import asdict
 from http.server import BaseHTTPRequestHandler
 from typing import Any
 
+from services.simulators.board import HeldBoard
 from services.simulators.camera import troubles
 from services.simulators.camera.http import CameraServer
 from services.simulators.camera.motors import Axes, reading
@@ -75,6 +77,11 @@ def _stir(camera: CameraServer, order: dict[str, Any]) -> None:
     camera.device.detector.stir(camera.clock() + float(order["seconds"]))
 
 
+def _board(camera: CameraServer, order: dict[str, Any]) -> None:
+    name = str(order.pop("name", "board"))
+    camera.pictures.hold(name, HeldBoard.model_validate(order) if order else None)
+
+
 def _tone(camera: CameraServer, order: dict[str, Any]) -> None:
     camera.device.microphone.hertz = float(order["hertz"])
 
@@ -112,6 +119,7 @@ ORDERS: dict[str, Order] = {
     "/pose": _pose,
     "/event": _event,
     "/stir": _stir,
+    "/board": _board,
     "/tone": _tone,
     "/clock": _clock,
     "/card": _card,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import itertools
+import re
 import socket
 import subprocess
 import threading
@@ -345,9 +346,11 @@ def test_curl_shows_the_stream(studio: Studio) -> None:
     assert curl.stdout is not None
     wait_until(lambda: studio.newest.wanted, "curl")
     number = studio.expose()
-    head = b"".join(curl.stdout.readline() for _ in range(4)).decode()
+    head = b"".join(curl.stdout.readline() for _ in range(5)).decode()
     assert head.startswith(f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: ")
-    jpeg = curl.stdout.read(int(head.split()[-1]))
+    length, stamp = re.findall(r"[\d.]+(?=\r\n)", head)
+    assert abs(float(stamp) - time.time()) < 60.0, "when the picture was exposed"
+    jpeg = curl.stdout.read(int(length))
     assert np.abs(pictures.decode(jpeg).astype(int) - picture(number)).mean() < 3
     curl.kill()
     curl.communicate()

@@ -157,9 +157,9 @@ def test_without_rtsp_snapshots_are_handed_on(tmp_path: Path, camera: simulated.
         assert here.end_of("1", 20)["state"] == "done"
         image = turning(here, lambda: first_picture(stream(here)["url"]))
         assert image.shape == (1296, 2304, 3)
-        here.until(lambda: diagnostic(here)["values"]["stream"] == "snapshots", 5)
+        here.until(lambda: "stream broke off" in diagnostic(here)["message"], 10)
+        assert diagnostic(here)["values"]["stream"] == "snapshots"
         assert diagnostic(here)["level"] == 1
-        assert "stream broke off" in diagnostic(here)["message"]
 
 
 def test_without_rtsp_the_cameras_mjpeg_is_handed_on_where_that_is_allowed(

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from services.simulators.board import HeldBoard
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.motors import Pose, magnification
 from services.simulators.camera.view.optics import Window, project, window
@@ -38,6 +39,7 @@ class Still:
     pose: Pose
     window: Window
     image: Image
+    boards: int  # how often they had been moved
 
 
 class Pictures:
@@ -77,18 +79,24 @@ class Pictures:
     def frame(self, stream: Stream, now: float) -> Image:
         """The picture of this moment (BGR), made anew."""
         with self._lock:
-            return self._developed(stream, *self._motors(now), self._exposure(now))
+            return self._developed(stream, *self._motors(now), self.light(now))
 
     def jpeg(self, stream: Stream, now: float) -> bytes:
         """The picture of this moment, encoded."""
         with self._lock:
             pose, rates = self._motors(now)
-            key = (pose, self._tables.changes, self._exposure(now), int(now * self.fps(stream)))
+            moved = self._scene.changes
+            key = (pose, self._tables.changes, self.light(now), int(now * self.fps(stream)), moved)
             if stream not in self._newest or self._newest[stream][0] != key:
                 self._newest[stream] = key, _encoded(self._developed(stream, pose, rates, key[2]))
             return self._newest[stream][1]
 
-    def _exposure(self, now: float) -> float:
+    def hold(self, name: str, board: HeldBoard | None) -> None:
+        """Somebody holds a board there from now on, or (None) puts it away."""
+        with self._lock:
+            self._scene.hold(name, board)
+
+    def light(self, now: float) -> float:
         """How much light it has found: a change of mode starts in the dark, and settles in SETTLING_S."""
         since = now - self._tables.exposed_at
         return 1.0 if not 0.0 <= since < SETTLING_S else DARK + (1.0 - DARK) * since / SETTLING_S
@@ -109,8 +117,9 @@ class Pictures:
         zoom, lens = magnification(pose.zoom), self._camera.lens
         width, height = min(size[0], round(lens.width / zoom)), min(size[1], round(lens.height / zoom))
         view, still = window(lens, zoom, width, height), self._stills.get(stream)
-        if still is None or (still.pose, still.window) != (pose, view):
-            still = Still(pose, view, self._scene.draw(self._camera.pose(pose.pan, pose.tilt), view))
+        moved = self._scene.changes
+        if still is None or (still.pose, still.window, still.boards) != (pose, view, moved):
+            still = Still(pose, view, self._scene.draw(self._camera.pose(pose.pan, pose.tilt), view), moved)
             self._stills[stream] = still
         return still
 

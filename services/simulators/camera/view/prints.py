@@ -61,23 +61,27 @@ def corners(marker: Marker) -> Array:
 
 def draw(image: Image, marker: Marker, view: View, boxes: list[Box]) -> None:
     """Draws a marker into the picture, where it faces the camera and nothing stands before it."""
-    patch = _patch(marker, view)
+    patch = rows_and_columns(marker.pose, paper(marker), view)
     if patch is None:
         return
     rays, near = view.rays[patch], [box for box in boxes if box.may_hide(view.pose.translation, paper(marker))]
     grey, cover = _averaged(marker, view, rays)
-    cover *= _free(marker, view, rays, near)
-    spot = image[patch]
+    cover *= free(marker.pose, view, rays, near)
+    laid(image[patch], grey, cover)
+
+
+def laid(spot: Image, grey: Float32, cover: Float32) -> None:
+    """Lays greys over a part of a picture where they cover it."""
     spot[:] = np.round(spot * (1 - cover)[..., None] + (grey * cover)[..., None]).astype(np.uint8)
 
 
-def _patch(marker: Marker, view: View) -> tuple[slice, slice] | None:
-    """The rows and columns of the picture that hold the print; None when its front is not in the picture.
+def rows_and_columns(pose: Transform, corners: Array, view: View) -> tuple[slice, slice] | None:
+    """Those of the picture that hold a sheet (`corners` in the apartment); None when its front is not in the picture.
 
     Rays are clipped to those of the picture's edge first: far outside, the distortion's polynomial folds back.
     """
-    sheet = view.pose.inverse().apply(paper(marker))
-    if marker.pose.inverse().apply(view.pose.translation)[2] <= 0.0 or (sheet[:, 2] <= NEAR_M).any():
+    sheet = view.pose.inverse().apply(corners)
+    if pose.inverse().apply(view.pose.translation)[2] <= 0.0 or (sheet[:, 2] <= NEAR_M).any():
         return None
     ways, edges = sheet / sheet[:, 2:], view.rays[:: view.window.height - 1, :: view.window.width - 1]
     reach = 1.05 * np.abs(edges).max(axis=(0, 1))
@@ -89,9 +93,9 @@ def _patch(marker: Marker, view: View) -> tuple[slice, slice] | None:
     return (slice(top, bottom), slice(left, right)) if left < right and top < bottom else None
 
 
-def _plane(marker: Marker, view: View, rays: Float32) -> Float32:
-    """Where rays (h, w, 2) of the camera meet the marker's plane, in its frame (h, w, 2): a homography."""
-    seen = marker.pose.inverse() @ view.pose
+def plane(pose: Transform, view: View, rays: Float32) -> Float32:
+    """Where rays (h, w, 2) of the camera meet a sheet's plane, in its frame (h, w, 2): a homography."""
+    seen = pose.inverse() @ view.pose
     turn, (x, y, z) = seen.rotation, seen.translation
     to_plane = np.array([x * turn[2] - z * turn[0], y * turn[2] - z * turn[1], turn[2]])
     return np.asarray(cv2.perspectiveTransform(rays, to_plane), np.float32)
@@ -103,7 +107,7 @@ def _averaged(marker: Marker, view: View, rays: Float32) -> tuple[Float32, Float
     fine = int(np.clip(np.sqrt(SAMPLES_TARGET / (height * width)), 2, 8))
     dense = np.asarray(cv2.resize(rays, (width * fine, height * fine), interpolation=cv2.INTER_LINEAR), np.float32)
     module = marker.size / 7
-    x, y = np.moveaxis(_plane(marker, view, dense) / module, -1, 0)
+    x, y = np.moveaxis(plane(marker.pose, view, dense) / module, -1, 0)
     count = 7 + 2 * MARGIN
     column, row = np.floor(x + count / 2).astype(int), np.floor(count / 2 - y).astype(int)
     on = (column >= 0) & (column < count) & (row >= 0) & (row < count)
@@ -113,10 +117,12 @@ def _averaged(marker: Marker, view: View, rays: Float32) -> tuple[Float32, Float
     return (ink / np.maximum(cover, 1e-6)).astype(np.float32), cover.astype(np.float32)
 
 
-def _free(marker: Marker, view: View, rays: Float32, boxes: list[Box]) -> NDArray[np.bool_]:
-    """For every pixel of a patch, whether nothing stands between the camera and the marker."""
-    flat = _plane(marker, view, rays).reshape(-1, 2)
-    points = marker.pose.apply(np.column_stack([flat, np.full(len(flat), LIFT_M)]))
+def free(pose: Transform, view: View, rays: Float32, boxes: list[Box]) -> NDArray[np.bool_]:
+    """For every pixel of a patch, whether nothing stands between the camera and the sheet."""
+    if not boxes:
+        return np.ones(rays.shape[:2], np.bool_)
+    flat = plane(pose, view, rays).reshape(-1, 2)
+    points = pose.apply(np.column_stack([flat, np.full(len(flat), LIFT_M)]))
     hidden = np.zeros(len(points), bool)
     for box in boxes:
         hidden |= box.hides(view.pose.translation, points)

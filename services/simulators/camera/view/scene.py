@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from services.simulators.camera.view import prints
+from services.simulators.board import HeldBoard
+from services.simulators.camera.view import boards, prints
 from services.simulators.camera.view.looks import DENSITY
 from services.simulators.camera.view.optics import Float32, Window, rays
 from services.simulators.camera.view.order import Indexes, Order
@@ -79,9 +80,29 @@ class Scene:
         self.order = Order(self.boxes)
         self._surfaces: dict[tuple[int, int], Surface] = {}
         self._bends: dict[Window, Bend] = {}
+        self.boards = dict(world.boards)
+        self.changes = 0  # of the boards
+        self._room: tuple[tuple[bytes, bytes, Window], Image, View] | None = None
+
+    def hold(self, name: str, board: HeldBoard | None) -> None:
+        """Somebody holds a board there from now on, or (None) puts it away."""
+        self.boards.pop(name, None)
+        self.boards.update({} if board is None else {name: board})
+        self.changes += 1
 
     def draw(self, pose: Transform, window: Window) -> Image:
         """The upright picture (BGR) from `T_AC` of what the window of the sensor shows."""
+        key = (pose.rotation.tobytes(), pose.translation.tobytes(), window)
+        if self._room is None or self._room[0] != key:  # a board that is moved does not change the room behind it
+            self._room = (key, *self._drawn(pose, window))
+        _, room, view = self._room
+        image = room.copy()
+        for board in self.boards.values():
+            boards.draw(image, board, view, self.boxes)
+        return cv2.GaussianBlur(image, (3, 3), 0.5)  # type: ignore[return-value]
+
+    def _drawn(self, pose: Transform, window: Window) -> tuple[Image, View]:
+        """The room with its markers, without boards, and how it is seen."""
         if window not in self._bends:
             self._bends = {window: bend(self.lens, window), **dict(list(self._bends.items())[: WINDOWS - 1])}
         how = self._bends[window]
@@ -91,7 +112,7 @@ class Scene:
         view = View(pose, self.lens, window, how.rays)
         for marker in self.world.markers:
             prints.draw(image, marker, view, self.boxes)
-        return cv2.GaussianBlur(image, (3, 3), 0.5)  # type: ignore[return-value]
+        return image, view
 
     def _draw_all(self, flat: Pinhole, pose: Transform) -> None:
         to_camera = pose.inverse()

@@ -1,0 +1,115 @@
+"""The second picture mode of a scan, black and white with high contrast, and the way back to how it was.
+
+How it was is written down before anything is changed, so that a service that was killed restores it in its next life.
+The orders' own modes are in `looks.py`.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import cast, get_args
+
+from services.camera.errands import GetContrast, SetContrast
+from services.camera.looks import SCAN_CONTRAST
+from services.camera.plan import Plan, ask, attempt
+from services.camera.requests import GetPicture, Mode, Picture, Refused, Reply, SetPicture
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Before:
+    """How the camera's picture was; `contrast` empty where it does not tell."""
+
+    mode: Mode
+    contrast: tuple[int, ...] = ()
+
+
+class Modes:
+    """One camera's. `file`: where the note is kept; None: nowhere."""
+
+    def __init__(self, file: Path | None) -> None:
+        self.file = file
+        self.noted: Before | None = None  # how it was, from before this scan's first change
+        self.changed = False  # and is to be again
+        self.leaving = False
+        self._recall()
+
+    def note(self, asked: Reply | None = None) -> Plan[None]:
+        """Asks how the picture is, unless that is still to be restored; `asked`: the answer to GetPicture, if any."""
+        if self.changed:
+            return
+        reply = asked if asked is not None and asked.error is None else (yield from ask(GetPicture()))
+        picture = cast(Picture, reply.result)
+        told = yield from attempt(GetContrast())
+        self.noted = Before(picture.mode, cast(tuple[int, ...], told.result) if told.error is None else ())
+
+    def forget(self) -> None:
+        """A new scan asks anew."""
+        if not self.changed:
+            self.noted = None
+
+    def enter(self) -> Plan[float]:
+        """Black and white with high contrast from now on; returns about when. Refused where the camera cannot."""
+        if self.noted is None:
+            yield from self.note()
+        assert self.noted is not None
+        high = (SCAN_CONTRAST,) * len(self.noted.contrast)
+        if self.noted.mode == "bw" and self.noted.contrast == high:
+            raise Refused("the picture is black and white with high contrast already")
+        self._write()
+        reply = yield from ask(SetPicture(mode="bw"))
+        if cast(Picture, reply.result).mode != "bw":
+            raise Refused("the camera said OK, but its video mode has not changed")
+        if high:
+            reply = yield from ask(SetContrast(high))
+        return (reply.sent + reply.received) / 2
+
+    def leave(self) -> Plan[None]:
+        """As it was. DeviceError: it is still to be restored."""
+        if not self.changed or self.noted is None or self.leaving:
+            return
+        self.leaving = True
+        try:
+            yield from self._restore(self.noted)
+        finally:
+            self.leaving = False
+
+    def give_over(self) -> None:
+        """Somebody else decides how the picture is, from now on."""
+        self.changed, self.noted = False, None
+        if self.file is not None:
+            self.file.unlink(missing_ok=True)
+
+    def _restore(self, before: Before) -> Plan[None]:
+        reply = yield from ask(SetPicture(mode=before.mode))
+        if cast(Picture, reply.result).mode != before.mode:
+            raise Refused("the camera said OK, but its video mode has not changed")
+        if before.contrast:
+            yield from attempt(SetContrast(before.contrast))
+        if self.noted is before:
+            self.give_over()
+
+    def _write(self) -> None:
+        self.changed = True
+        if self.file is not None and self.noted is not None:
+            try:
+                self.file.parent.mkdir(parents=True, exist_ok=True)
+                self.file.write_text(json.dumps(asdict(self.noted)), encoding="utf-8")
+            except OSError as error:
+                log.warning("how the picture was is not kept: %s", error)
+
+    def _recall(self) -> None:
+        if self.file is None or not self.file.exists():
+            return
+        try:
+            kept = json.loads(self.file.read_text(encoding="utf-8"))
+            mode, contrast = kept["mode"], tuple(int(one) for one in kept["contrast"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            log.warning("%s cannot be read: %s", self.file, error)
+            return
+        if mode in get_args(Mode):
+            self.noted, self.changed = Before(mode, contrast), True

@@ -1,0 +1,125 @@
+"""Answers `history/get` in `handle`, and keeps house in `tick`, a small piece at a time.
+
+While the database is away a question is answered with that. Not here: the answers (`answers.py`).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from pydantic import SecretStr, field_validator
+
+from services import topics
+from services.bus import Message
+from services.errors import ConfigError, Unavailable
+from services.history import answers
+from services.payloads import HistoryGet, HistoryReply
+from services.runner import Post
+from services.section import Section
+from services.storage import Address, Storage, open_storage, read_address
+
+log = logging.getLogger(__name__)
+
+AGAIN_S = 1.0  # between attempts to open the database
+COUNTERS = ("questions", "unanswered")
+
+
+class Config(Section):
+    """The section `history`; without one the service does not run."""
+
+    url: str  # as in the section persistence: the same database
+    password: SecretStr | None = None
+    view_database: str = "OpenHAB"
+    folder: Path = Path()
+
+    @field_validator("url")
+    @classmethod
+    def is_an_address(cls, url: str) -> str:
+        try:
+            read_address(url)
+        except ConfigError as error:
+            raise ValueError("; ".join(fault.removeprefix("url: ") for fault in error.faults)) from error
+        return url
+
+    @property
+    def address(self) -> Address:
+        """Where the database is."""
+        password = self.password.get_secret_value() if self.password else None
+        return read_address(self.url, password=password, view_database=self.view_database, folder=self.folder)
+
+
+@contextmanager
+def start(config: Config, post: Post) -> Iterator[History]:
+    """The service; a database that is away is waited for."""
+    service = History(lambda: open_storage(config.address))
+    try:
+        yield service
+    finally:
+        service.close()
+
+
+class History:
+    """The service; see `services.runner.Service`."""
+
+    def __init__(self, opener: Callable[[], Storage]) -> None:
+        self.subscribes = (topics.HISTORY_GET.filter,)
+        self.due: float | None = None
+        self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
+        self._opener = opener
+        self._storage: Storage | None = None
+        self._not_before = 0.0
+        self._reason = ""
+
+    def handle(self, message: Message, now: float) -> Iterator[Message]:
+        """Answers a question, in every case."""
+        asked: HistoryGet = topics.read(message, now).payload
+        self.counters["questions"] += 1
+        reply = topics.HISTORY_REPLY.message(self._reply(asked, now), id=asked.id)
+        if len(reply.payload) > topics.TEXT_LIMIT:
+            reply = topics.HISTORY_REPLY.message(self._told(asked, "too long an answer: ask for less"), id=asked.id)
+        yield reply
+        if (also := topics.reply(reply, message)) is not None:
+            yield also
+
+    def tick(self, now: float) -> tuple[Message, ...]:
+        """Nothing to do between questions."""
+        return ()
+
+    def close(self) -> None:
+        """Ends the connection."""
+        if self._storage is not None:
+            self._storage.close()
+            self._storage = None
+
+    def _reply(self, asked: HistoryGet, now: float) -> HistoryReply:
+        try:
+            return answers.answer(self._opened(now), asked, now)
+        except Unavailable as error:
+            self.close()
+            self._lost(error, now)
+            return self._told(asked, f"the database is away: {error}")
+
+    def _told(self, asked: HistoryGet, error: str) -> HistoryReply:
+        self.counters["unanswered"] += 1
+        return HistoryReply(id=asked.id, item=asked.item, samples=[], error=error)
+
+    def _opened(self, now: float) -> Storage:
+        """The storage, opened when that is due."""
+        if self._storage is None:
+            if now < self._not_before:
+                raise Unavailable(self._reason)
+            try:
+                self._storage = self._opener()
+            except ConfigError as error:
+                raise Unavailable(str(error)) from error
+            self._reason = ""
+        return self._storage
+
+    def _lost(self, error: Unavailable, now: float) -> None:
+        if not self._reason:
+            log.warning("no answers: %s", error)
+        self._reason, self._not_before = str(error), now + AGAIN_S

@@ -1,0 +1,113 @@
+"""The mission service: each message goes to the desk of the robot that it concerns, or to all. See `__init__`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+
+from services import robot_places, topics
+from services.bus import Message
+from services.errors import BadMessage
+from services.mission.chart import Chart
+from services.mission.desk import Desk
+from services.mission.memory import Memory, by_camera
+from services.mission.settings import Config
+from services.robot_payloads import WhereReply
+from services.runner import Post
+
+USABLE = ("online", "degraded")
+
+
+@contextmanager
+def start(config: Config, post: Post) -> Iterator[Missions]:
+    """The service; it holds nothing that has to be closed. ConfigError when a robot's places cannot be read."""
+    yield Missions(config)
+
+
+def check(config: Config) -> None:
+    """Reads the files that the settings name; ConfigError tells their faults."""
+    for robot in config.robots.values():
+        robot_places.read(config.folder / robot.places)
+
+
+class Missions:
+    """The service. `desks` by robot; they share one memory of what was seen."""
+
+    subscribes = (
+        topics.MISSION_ORDER.filter, topics.MISSION_WHERE.filter, topics.ROBOT_POSE.filter, topics.ROBOT_SEEN.filter,
+        topics.ROBOT_GOTO_RESULT.filter, topics.CAMERA_MARKER.filter, topics.CAMERA_SCAN_RESULT.filter,
+        topics.CAMERA_ORDER_RESULT.filter, topics.CAMERA_STATUS.filter, topics.SERVICE_STATUS.filter,
+    )  # fmt: skip
+
+    def __init__(self, config: Config) -> None:
+        self.memory = Memory()
+        self.desks = {
+            name: Desk(name, config, Chart(*robot_places.read(config.folder / one.places)), self.memory)
+            for name, one in config.robots.items()
+        }
+
+    @property
+    def due(self) -> float | None:
+        """When `tick` is wanted."""
+        return min((desk.due for desk in self.desks.values()), default=None)
+
+    @property
+    def counters(self) -> dict[str, float]:
+        """For `service/mission/info`."""
+        return {"missions": sum(desk.mission is not None for desk in self.desks.values())}
+
+    def handle(self, message: Message, now: float) -> Iterable[Message]:
+        """Takes one message; BadMessage when it is for a robot that is not configured."""
+        read = topics.read(message, now)
+        if "robot" in read.levels:
+            return self._of_robot(read, now)
+        return self._of_house(read, now)
+
+    def tick(self, now: float) -> Iterator[Message]:
+        """What is due at every desk."""
+        for desk in self.desks.values():
+            yield from desk.tick(now)
+
+    def _of_robot(self, read: topics.Read, now: float) -> Iterable[Message]:
+        desk = self.desks.get(read.levels["robot"])
+        if desk is None:
+            raise BadMessage(f"{read.message.topic}: expected one of {', '.join(self.desks)}")
+        if read.topic is topics.MISSION_ORDER:
+            return desk.order(read.payload, now)
+        if read.topic is topics.ROBOT_GOTO_RESULT:
+            return desk.goal_ended(read.payload, now)
+        if read.topic is topics.ROBOT_SEEN:
+            return desk.sees(read.payload, now)
+        if read.topic is topics.MISSION_WHERE:
+            return [self._whereabouts(read, now)]
+        desk.stands_at(read.payload, now)
+        return ()
+
+    def _whereabouts(self, read: topics.Read, now: float) -> Message:
+        asked = read.payload
+        reply = WhereReply(id=asked.id, marker=asked.marker, sightings=self.memory.told(asked.marker, now))
+        return topics.MISSION_WHERE_REPLY.message(reply, robot=read.levels["robot"], id=asked.id)
+
+    def _of_house(self, read: topics.Read, now: float) -> Iterator[Message]:
+        if read.topic in (topics.CAMERA_MARKER, topics.CAMERA_SCAN_RESULT):
+            sighting = by_camera(read.payload)
+            if self.memory.note(sighting):
+                for desk in self.desks.values():
+                    yield from desk.sighted(sighting, now)
+        elif read.topic is topics.CAMERA_ORDER_RESULT:
+            for desk in self.desks.values():
+                yield from desk.scan_ended(read.levels["cam"], read.payload, now)
+        elif read.topic is topics.CAMERA_STATUS:
+            yield from self._camera(read.levels["cam"], read.payload.state in USABLE, None, now)
+        elif read.levels["service"].startswith("camera-"):
+            yield from self._camera(read.levels["service"].removeprefix("camera-"), None, read.payload == "online", now)
+
+    def _camera(self, name: str, usable: bool | None, serves: bool | None, now: float) -> Iterator[Message]:
+        """A camera reboots and goes on with its scan; one whose service is gone does not."""
+        for desk in self.desks.values():
+            if name not in desk.cameras:
+                continue
+            if usable is not None:
+                desk.cameras[name] = usable
+            if serves is False:
+                yield from desk.camera_gone(name, now)

@@ -1,0 +1,204 @@
+"""Items files: from the tree to `ItemLine`s, and what OpenHAB's validator and the parts behind it would say. Pure.
+
+Not here: what only several files together show (`across.py`), and Alexa's metadata (`voice.py`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from lark import Token
+
+from services.home import NAME
+from services.openhab.check import patterns
+from services.openhab.check.findings import Findings, Place
+from services.openhab.check.items_grammar import FUNCTIONS, NEW_FUNCTIONS, grammar
+from services.openhab.check.reading import Node, below, name_of, text_of, tokens, tree
+from services.openhab.check.settings import settings_of
+from services.openhab.lines import ItemLine, Metadata
+from services.openhab.readback import metadata_of, split_label
+from services.openhab.state_description import NAMESPACE
+from services.openhab.versions import Version
+from services.openhab.words import words
+from services.states import ITEM_TYPES
+
+DIMENSIONS = words(
+    "Acceleration AmountOfSubstance Angle Area ArealDensity CalorificValue CatalyticActivity Currency "
+    "DataAmount DataTransferRate Density Dimensionless ElectricCapacitance ElectricCharge ElectricConductance "
+    "ElectricConductivity ElectricCurrent ElectricInductance ElectricPotential ElectricResistance "
+    "EmissionIntensity Energy EnergyPrice Force Frequency Illuminance Intensity Length LuminousFlux "
+    "LuminousIntensity MagneticFlux MagneticFluxDensity Mass Power Pressure RadiantExposure "
+    "RadiationDoseAbsorbed RadiationDoseEffective RadiationSpecificActivity Radioactivity SolidAngle Speed "
+    "Temperature Time Volume VolumetricFlowRate"
+)
+ARGUMENTS = {"AND": 2, "OR": 2, "NAND": 2, "NOR": 2, "XOR": 2, "COUNT": 1}
+PROFILES = words(
+    "default follow offset hysteresis range trigger-event-string timestamp-change timestamp-offset "
+    "timestamp-trigger timestamp-update rawbutton-on-off-switch rawbutton-toggle-player "
+    "rawbutton-toggle-rollershutter rawbutton-toggle-switch rawrocker-to-dimmer rawrocker-to-next-previous "
+    "rawrocker-to-on-off rawrocker-to-play-pause rawrocker-to-rewind-fastforward rawrocker-to-stop-move "
+    "rawrocker-to-up-down"
+)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A name that has to be defined somewhere."""
+
+    name: str
+    line: int
+    column: int
+
+
+@dataclass(frozen=True)
+class Items:
+    """What an items file holds; `groups` are the references to groups in their places."""
+
+    lines: tuple[ItemLine, ...] = ()
+    groups: tuple[Reference, ...] = ()
+
+
+def read(text: str, version: Version, findings: Findings) -> Items:
+    """The items of a file; what is wrong goes to the findings. Nothing when its grammar is wrong."""
+    root = tree(grammar(version), text, findings)
+    if root is None:
+        return Items()
+    nodes = below(root, "item")
+    lines = tuple(_line(node, findings) for node in nodes)
+    for line in lines:
+        _check(line, version, findings)
+    groups = [token for node in nodes for part in below(node, "groups") for token in tokens(part, "ID")]
+    return Items(lines, tuple(Reference(name_of(one), one.line or 1, one.column or 1) for one in groups))
+
+
+def _line(node: Node, findings: Findings) -> ItemLine:
+    kind = below(node, "kind")[0]
+    kinds = list(kind.scan_values(lambda one: isinstance(one, Token)))
+    arguments = [one for part in kind.find_data("arguments") for one in part.children if isinstance(one, Token)]
+    name = tokens(node, "ID")[0]
+    label = [text_of(one, findings) for part in below(node, "label") for one in tokens(part, "STRING")]
+    icons = [str(one) for part in below(node, "icon") for one in part.children]
+    return ItemLine(
+        type=":".join(str(one) for one in kinds if one not in arguments),
+        name=name_of(name),
+        label=label[0] if label else None,
+        icon=":".join(icons).strip("\"'") or None,
+        groups=tuple(name_of(one) for part in below(node, "groups") for one in tokens(part, "ID")),
+        tags=tuple(
+            _word(one, findings) for part in below(node, "tags") for one in part.children if isinstance(one, Token)
+        ),
+        metadata=tuple(_metadata(one, findings) for part in below(node, "bindings") for one in below(part, "binding")),
+        arguments=tuple(_word(one, findings) for one in arguments),
+        line=name.line or 1,
+        column=name.column or 1,
+    )
+
+
+def _word(token: Token, findings: Findings) -> str:
+    return text_of(token, findings) if token.type == "STRING" else name_of(token)
+
+
+def _metadata(node: Node, findings: Findings) -> Metadata:
+    key, value = tokens(node, "ID")[0], tokens(node, "STRING")[0]
+    settings = settings_of(next(iter(below(node, "settings")), None), findings)
+    return Metadata(name_of(key), text_of(value, findings), settings, key.line or 1, key.column or 1)
+
+
+def _check(line: ItemLine, version: Version, findings: Findings) -> None:
+    if not re.fullmatch(NAME, line.name):
+        findings.error(line, f"expected a name of letters, digits and _ that begins with no digit, got {line.name!r}")
+    for fault in _type_faults(line, version):
+        findings.error(line, fault)
+    _, shown = split_label(line.label or "")
+    if (wrong := patterns.pattern(shown)) is not None:
+        findings.error(line, wrong)
+    seen: set[str] = set()
+    for one in line.metadata:
+        if one.namespace in seen and one.namespace != "channel":
+            findings.warning(one, f"expected every namespace once, got {one.namespace!r} again")
+        seen.add(one.namespace)
+        _check_metadata(line, one, version, findings)
+
+
+def _type_faults(line: ItemLine, version: Version) -> Iterator[str]:
+    kind, *rest = line.type.split(":")
+    if kind == "Group":
+        yield from _group_faults(line, rest, version)
+    elif kind not in ITEM_TYPES:
+        yield f"expected a type of item ({', '.join(ITEM_TYPES)} or Group), got {line.type!r}"
+    elif rest and (kind != "Number" or len(rest) > 1):
+        yield f"expected {kind}{':<dimension>' if kind == 'Number' else ' alone'}, got {line.type!r}"
+    elif rest and rest[0] not in DIMENSIONS:
+        yield f"expected a dimension such as Temperature, got {rest[0]!r}"
+    if kind != "Group" and line.arguments:
+        yield "expected arguments behind a group's function only"
+
+
+def _group_faults(line: ItemLine, rest: list[str], version: Version) -> Iterator[str]:
+    known = (*FUNCTIONS, *(NEW_FUNCTIONS if version >= (Version(4, 3)) else ()))
+    base, *more = rest or [""]
+    if base and base not in ITEM_TYPES:
+        yield f"expected the type of the members, got {base!r}"
+        return
+    if base == "Number" and more and more[0] not in known:
+        dimension = more.pop(0)
+        if dimension not in DIMENSIONS:
+            yield f"expected a dimension or a function ({', '.join(known)}), got {dimension!r}"
+            return
+    if more and (len(more) > 1 or more[0] not in known):
+        yield f"expected one of {', '.join(known)}, got {':'.join(more)!r}"
+        return
+    wanted = ARGUMENTS.get(more[0], 0) if more else 0
+    if len(line.arguments) != wanted:
+        yield f"expected {wanted} arguments of {more[0] if more else 'a group'}, got {len(line.arguments)}"
+
+
+def _check_metadata(line: ItemLine, one: Metadata, version: Version, findings: Findings) -> None:
+    here = Place(one.line, one.column)
+    faults: list[str | None] = [patterns.credentials(text) for text in _texts(one)]
+    if one.namespace == "channel":
+        faults += [patterns.channel(one.value), _profile_fault(one)]
+    elif one.namespace == "autoupdate" and one.value not in ("true", "false"):
+        faults.append(f"expected true or false, got {one.value!r}")
+    elif one.namespace == "expire":
+        faults.append(patterns.expire(one.value, version))
+    elif one.namespace == "unit" and line.type.split(":")[0] not in ("Number", "Group"):
+        faults.append(f"expected a unit for a Number only, got one for a {line.type}")
+    elif one.namespace == NAMESPACE:
+        faults += _described(line)
+    for fault in faults:
+        if fault:
+            findings.error(here, fault)
+
+
+def _texts(one: Metadata) -> Iterator[str]:
+    yield one.value
+    yield from (value for value in one.settings.values() if isinstance(value, str))
+
+
+def _profile_fault(one: Metadata) -> str | None:
+    profile = one.settings.get("profile")
+    if not isinstance(profile, str):
+        return None if profile is None else f"expected the name of a profile, got {profile!r}"
+    parts = profile.split(":")
+    if len(parts) > 2 or not all(patterns.SEGMENT.fullmatch(part) for part in parts):
+        return f"expected a profile such as follow or transform:MAP, got {profile!r}"
+    if (len(parts) == 1 or parts[0] == "system") and parts[-1] not in PROFILES:
+        return f"expected a profile of OpenHAB's own, or <add-on>:<profile>, got {profile!r}"
+    return None
+
+
+def _described(line: ItemLine) -> Iterator[str | None]:
+    shown = metadata_of(line, NAMESPACE)
+    assert shown is not None
+    for key, value in shown.settings.items():
+        if key == "pattern":
+            yield patterns.pattern(str(value))
+        elif key == "options":
+            yield patterns.options(str(value)) if not isinstance(value, tuple) else None
+        elif key in ("min", "max", "step") and not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", str(value)):
+            yield f"expected a number for {key}, got {value!r}"
+        elif key == "readOnly" and str(value).lower() not in ("true", "false"):
+            yield f"expected true or false for readOnly, got {value!r}"

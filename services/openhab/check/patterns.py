@@ -1,0 +1,130 @@
+"""The small languages within texts: patterns, options, expiry, channel UIDs, cron, MQTT filters, addresses. Pure.
+
+Each function says what is wrong with a text, or None.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from services.openhab.versions import Version
+
+CONVERSION = re.compile(
+    r"%(?:unit%|%|n|(?:\d+\$|<)?[-#+ 0,(]*\d*(?:\.\d+)?(?:[tT][HIklMSLNpzZsQBbhAaCYyjmdeRTrDFc]|[bBhHsScCdoxXeEfgGaA]))"
+)
+TRANSFORM = re.compile(r"[A-Z0-9]+\([^()]*\):(.*)", re.S)
+OLD_EXPIRE = re.compile(r"(?:(\d+)h)?\s*(?:(\d+)m)?\s*(?:(\d+)s)?")
+WORDY_EXPIRE = re.compile(
+    r"(?:\d+\s*(?:d|days?)\s*)?(?:\d+\s*(?:h|hrs?|hours?)\s*)?(?:\d+\s*(?:m|mins?|minutes?)\s*)?(?:\d+\s*(?:s|secs?|seconds?))?"
+)
+ISO_EXPIRE = re.compile(r"P(?!$)(?:\d+D)?(?:T(?=\d)(?:\d+H)?(?:\d+M)?(?:\d+(?:\.\d+)?S)?)?")
+SEGMENT = re.compile(r"[A-Za-z0-9_-]+")
+CREDENTIALS = re.compile(r"[a-z][a-z0-9+.-]*://[^/\s\"'?#]*@", re.I)
+SECRET_PARAMETER = re.compile(r"[?&](?:password|passwd|pwd|pass|loginpas|token)=[^&\s]+", re.I)
+CRON_FIELDS = (
+    ("seconds", 0, 59, ()),
+    ("minutes", 0, 59, ()),
+    ("hours", 0, 23, ()),
+    ("day of the month", 1, 31, ()),
+    ("month", 1, 12, ["JAN", "FEB", "MAR", "APR", "MAY", "JUN", "JUL", "AUG", "SEP", "OCT", "NOV", "DEC"]),
+    ("day of the week", 0, 7, ["SUN", "MON", "TUE", "WED", "THU", "FRI", "SAT"]),
+    ("year", 1970, 2199, ()),
+)
+
+
+def pattern(text: str) -> str | None:
+    """A pattern of states, as Java's formatter reads it, perhaps behind a transformation."""
+    match = TRANSFORM.fullmatch(text)
+    rest = CONVERSION.sub("", match[1] if match else text)
+    if "%" in rest:
+        return f"expected a pattern such as %.1f °C, with %% for a sign of percent, got {text!r}"
+    return None
+
+
+def options(text: str) -> str | None:
+    """`state=words,...` of a state description."""
+    for part in text.split(","):
+        state, equals, words = part.partition("=")
+        if not state.strip() or (equals and not words.strip()):
+            return f"expected options like state=words, got {part!r}"
+    return None
+
+
+def expire(text: str, version: Version) -> str | None:
+    """`5m`, `1h30m,UNDEF`, `10s,command=OFF`."""
+    duration, _, _what = text.partition(",")
+    duration = duration.strip()
+    short = bool(duration) and OLD_EXPIRE.fullmatch(duration) is not None
+    iso = version.major >= 4 and ISO_EXPIRE.fullmatch(duration) is not None
+    wordy = version.major >= 5 and bool(duration) and WORDY_EXPIRE.fullmatch(duration) is not None
+    if short or iso or wordy:
+        return None
+    forms = "such as 1h30m" + (" or PT1H30M" if version.major >= 4 else "") + (" or 1d" if version.major >= 5 else "")
+    return f"expected a time {forms}, got {duration!r}"
+
+
+def channel(text: str) -> str | None:
+    """`binding:type:thing:channel`, with `group#` before the channel's id where it has one."""
+    parts = text.split(":")
+    last, _, inner = parts[-1].partition("#")
+    if len(parts) < 4:
+        return f"expected a channel's UID, binding:type:thing:channel, got {text!r}"
+    wrong = [one for one in (*parts[:-1], last, *([inner] if "#" in parts[-1] else [])) if not SEGMENT.fullmatch(one)]
+    if wrong:
+        return f"expected letters, digits, _ and - between the colons of a UID, got {wrong[0]!r}"
+    return None
+
+
+def mqtt_filter(text: str) -> str | None:
+    """A topic that is listened to, perhaps with + and # for whole levels."""
+    levels = text.split("/")
+    if not text or "\0" in text:
+        return "expected a topic, got nothing"
+    for index, level in enumerate(levels):
+        if ("+" in level and level != "+") or ("#" in level and (level != "#" or index < len(levels) - 1)):
+            return f"expected + for a whole level and # for the last one, got {text!r}"
+    return None
+
+
+def mqtt_topic(text: str) -> str | None:
+    """A topic that is written to."""
+    if not text or "+" in text or "#" in text:
+        return f"expected a topic without + and #, got {text!r}"
+    return None
+
+
+def credentials(text: str) -> str | None:
+    """An address with an account in it, which everybody sees who sees the page."""
+    if CREDENTIALS.search(text) or SECRET_PARAMETER.search(text):
+        return "expected an address without a user or password in it"
+    return None
+
+
+def cron(text: str) -> str | None:
+    """Six or seven fields, seconds first."""
+    if text.strip().startswith("@"):
+        return None
+    fields = text.split()
+    if not 6 <= len(fields) <= 7:
+        return f"expected six or seven fields, seconds first, got {len(fields)} in {text!r}"
+    for field, (name, low, high, words) in zip(fields, CRON_FIELDS, strict=False):
+        for part in field.split(","):
+            if not _cron_part(part, low, high, words):
+                return f"expected a field for the {name} ({low} to {high}), got {part!r} in {text!r}"
+    return None
+
+
+def _cron_part(part: str, low: int, high: int, words: Sequence[str]) -> bool:
+    span, slash, step = part.partition("/")
+    if slash and not (step.isdigit() and int(step) > 0):
+        return False
+    if span in ("*", "?"):
+        return True
+    if words or high == 31:  # days and months have words and signs of their own
+        span = re.sub(r"^L(-\d+)?W?$|(?<=\d)(W|L|#[1-5])$|(?<=[A-Z])(L|#[1-5])$", "", span) or str(low)
+    ends = span.split("-")
+    numbers = [
+        words.index(end.upper()) + low if end.upper() in words else int(end) if end.isdigit() else None for end in ends
+    ]
+    return len(ends) <= 2 and all(one is not None and low <= one <= high for one in numbers)

@@ -1,0 +1,110 @@
+"""OpenHAB's configuration folder: what of it is ours, what would change, and writing it. Never touches others' files.
+
+Ours is what begins with our mark. Not here: the texts (`generate.py`).
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from services.errors import ConfigError
+from services.openhab.check import KINDS, read_site
+from services.openhab.generate import MARK
+from services.openhab.versions import Version
+
+PLACES = ("things", "items", "rules", "automation/js", "sitemaps", "persistence", "html", "widgets")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What writing would do: new texts by path, ours that go, and others' files that stand in the way."""
+
+    folder: Path
+    wanted: Mapping[str, str]
+    written: tuple[str, ...]
+    gone: tuple[str, ...]
+    foreign: tuple[str, ...]
+
+
+def plan(folder: Path, files: Mapping[str, str]) -> Plan:
+    """What would change in a folder."""
+    foreign = tuple(path for path in files if (folder / path).exists() and not is_ours(folder / path))
+    changed = tuple(path for path, text in files.items() if path not in foreign and _read(folder / path) != text)
+    return Plan(folder, files, changed, tuple(_left_over(folder, files)), foreign)
+
+
+def is_ours(file: Path) -> bool:
+    """Whether a file was written by us."""
+    return MARK in (_read(file) or "").partition("\n")[0]
+
+
+def _read(file: Path) -> str | None:
+    try:
+        return file.read_text(encoding="utf-8")
+    except (FileNotFoundError, UnicodeDecodeError):
+        return None
+
+
+def _left_over(folder: Path, files: Mapping[str, str]) -> Iterator[str]:
+    """Files of ours that are wanted no more, such as those of a camera that went."""
+    for place in PLACES:
+        for file in sorted((folder / place).glob("*")):
+            path = f"{place}/{file.name}"
+            if path not in files and file.is_file() and is_ours(file):
+                yield path
+
+
+def diff(plan: Plan) -> str:
+    """What would change, as a unified diff; empty when nothing would."""
+    parts: list[str] = []
+    for path in (*plan.written, *plan.gone):
+        old, new = (_read(plan.folder / path) or ""), plan.wanted.get(path, "")
+        names = (f"a/{path}" if old else "/dev/null", f"b/{path}" if new else "/dev/null")
+        parts += difflib.unified_diff(old.splitlines(keepends=True), new.splitlines(keepends=True), *names)
+    return "".join(line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in parts)
+
+
+def apply(plan: Plan) -> None:
+    """Writes; who reads meanwhile sees the old file or the new one, never a part."""
+    for path in plan.written:
+        file = plan.folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        beside = file.with_name(f".{file.name}.{os.getpid()}")
+        beside.write_text(plan.wanted[path], encoding="utf-8")
+        beside.replace(file)
+    for path in plan.gone:
+        (plan.folder / path).unlink()
+
+
+def texts(paths: Iterable[Path]) -> dict[str, str]:
+    """The texts of files and of all of OpenHAB's files in folders; ConfigError where one cannot be read."""
+    found: dict[str, str] = {}
+    faults = []
+    for path in paths:
+        files = sorted(file for file in path.rglob("*") if file.suffix in KINDS) if path.is_dir() else [path]
+        for file in files:
+            try:
+                found[str(file)] = file.read_text(encoding="utf-8")
+            except (OSError, UnicodeDecodeError) as error:
+                faults.append(
+                    f"{file}:1: file: expected a readable file, got {getattr(error, 'strerror', None) or error}"
+                )
+    if faults:
+        raise ConfigError(faults)
+    return found
+
+
+def taken(folder: Path, version: Version) -> dict[str, str]:
+    """What others' files in the folder define already: names of items and UIDs of things, each with file and line."""
+    others = {name: text for name, text in texts([folder]).items() if MARK not in text.partition("\n")[0]}
+    site, _ = read_site(others, version)
+    found: dict[str, str] = {}
+    for items, findings in site.items:
+        found |= {line.name: f"{findings.file}:{line.line}" for line in items.lines}
+    for things, findings in site.things:
+        found |= {thing.uid: f"{findings.file}:{thing.line}" for thing in things}
+    return found

@@ -1,0 +1,58 @@
+"""The things file: the broker's bridge with the bus' two channels, and the plain MQTT devices. Pure.
+
+Credentials are placeholders: who has an account puts it in once, in OpenHAB or in a copy of the file.
+"""
+
+from __future__ import annotations
+
+from services import topics
+from services.openhab import mqtt
+from services.openhab.lines import ChannelLine, Setting, ThingLine
+from services.openhab.site import Site
+
+USER = "openhab"
+PASSWORD = "CHANGE_ME"
+RECONNECT_MS = 5000  # the binding's own minute would leave the bus deaf that long
+SEPARATOR = "#"  # never part of a topic's name, so the first one ends the topic
+COMMANDS, UPDATES = "busCommand", "busSet"
+
+
+def lines(site: Site) -> list[ThingLine]:
+    """Every thing of the home's file, but those that other files have."""
+    found = [bridge(site), *mqtt.devices(site), *([mqtt.bus_thing(site)] if site.bus == "links" else [])]
+    return [thing for thing in found if thing.uid not in site.taken]
+
+
+def bridge(site: Site) -> ThingLine:
+    """The broker; its status on the bus is OpenHAB's."""
+    status = topics.SERVICE_STATUS.name(service="openhab")
+    settings: dict[str, Setting] = {
+        "host": site.broker.host,
+        "port": site.broker.port,
+        "secure": site.broker.secure,
+        "clientID": "openhab",
+        "qos": 1,
+        "keepAlive": 30,
+        "reconnectTime": RECONNECT_MS,
+        "username": USER,
+        "password": PASSWORD,
+        "lwtTopic": status,
+        "lwtMessage": "offline",
+        "lwtQos": 1,
+        "lwtRetain": True,
+    }
+    if site.broker.secure:  # a pinned certificate would shut the broker out when it is renewed
+        settings |= {"certificatepin": False, "publickeypin": False}
+    if site.version.major >= 3:
+        settings["enableDiscovery"] = False
+    if site.version.major >= 4:
+        settings |= {"birthTopic": status, "birthMessage": "online", "birthRetain": True}
+        settings |= {"shutdownTopic": status, "shutdownMessage": "offline", "shutdownRetain": True}
+    channels = () if site.bus == "links" else (_listener(COMMANDS, "command"), _listener(UPDATES, "set"))
+    return ThingLine(site.broker.uid, "Broker of the apartment", True, settings=settings, channels=channels)
+
+
+def _listener(id: str, verb: str) -> ChannelLine:
+    pattern = topics.HOME_COMMAND if verb == "command" else topics.HOME_SET
+    settings: dict[str, Setting] = {"stateTopic": pattern.filter, "separator": SEPARATOR}
+    return ChannelLine("Type", "publishTrigger", id, f"home/+/{verb}", settings)

@@ -1,0 +1,74 @@
+"""A robot's own file (`robot_places.yaml`): its named points, its map, and where the apartment lies in that map.
+
+Read by whoever speaks for a robot or sends one. Not here: from where it can see something (`mission/standing.py`).
+"""
+
+from __future__ import annotations
+
+from math import cos, radians, sin
+from pathlib import Path
+
+from pydantic import Field, ValidationError
+
+from services import document, floor
+from services.errors import ConfigError
+from services.floor import XY, Grid
+from services.section import Section
+
+
+class Relation(Section):
+    """The apartment frame's pose in the map frame."""
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw_deg: float = 0.0
+
+    def to_map(self, x: float, y: float) -> XY:
+        """A point of the apartment in the map, metres."""
+        c, s = cos(radians(self.yaw_deg)), sin(radians(self.yaw_deg))
+        return self.x + c * x - s * y, self.y + s * x + c * y
+
+    def to_apartment(self, x: float, y: float) -> XY:
+        """The reverse."""
+        c, s = cos(radians(self.yaw_deg)), sin(radians(self.yaw_deg))
+        return c * (x - self.x) + s * (y - self.y), -s * (x - self.x) + c * (y - self.y)
+
+
+class PointPose(Section):
+    """A named point: where the robot stands there, in the map frame."""
+
+    x: float
+    y: float
+    yaw_deg: float = 0.0
+
+
+class RobotPlaces(Section):
+    """The file."""
+
+    map: Path | None = None  # map_server's YAML, beside this file
+    apartment_to_map: Relation = Relation()
+    radius: float = Field(default=0.28, gt=0, lt=2)  # of the robot, metres
+    points: dict[str, PointPose] = {}
+
+    def named(self, name: str) -> str | None:
+        """The point's name as the file writes it, without regard to case; None when there is none."""
+        return {one.casefold(): one for one in self.points}.get(name.strip().casefold())
+
+
+def read(file: Path) -> tuple[RobotPlaces, Grid | None]:
+    """The file, and the map that it names; ConfigError tells every fault with file and line."""
+    source = document.read(file)
+    places = None
+    if not source.faults:
+        try:
+            places = RobotPlaces.model_validate(source.value or {})
+        except ValidationError as fault:
+            for error in fault.errors(include_url=False):
+                source.fault(error["loc"], f"expected {error['msg']}, got {error['input']!r:.80}")
+    if places is None or source.faults:
+        raise ConfigError(source.faults)
+    grid = floor.read(file.parent / places.map) if places.map else None
+    if grid is not None and grid.yaw:
+        source.fault(("map",), "expected a map that is not turned (the third number of its origin 0)")
+        raise ConfigError(source.faults)
+    return places, grid

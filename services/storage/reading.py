@@ -1,0 +1,195 @@
+"""Questions about what was: last value before a time, means per bucket, changes, how long in which state.
+
+The SQL for both databases, from whole numbers only. All times are microseconds since 1970, UTC; spans are
+`since <= time < until`. Not here: the plain list of samples (`Storage.samples`), who asks (`services/history/`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from services.storage import Item, Sample, Storage
+from services.storage.mysql_text import MICROSECONDS, moment
+
+SECOND = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """What differs: a time as a literal, a column as microseconds, a join that keeps its order, whole division."""
+
+    at: Callable[[int], str]
+    micro: str
+    join: str
+    div: str
+    greatest_key: str  # the newest key of an item before a bound, as a subquery
+
+
+DIALECTS = {
+    "mysql": Dialect(
+        moment, MICROSECONDS, "STRAIGHT_JOIN", "DIV",
+        "(SELECT x.time FROM sample x WHERE x.item_id=i.item_id AND x.time<{} ORDER BY x.time DESC LIMIT 1)",
+    ),
+    "sqlite": Dialect(
+        str, "{}", "CROSS JOIN", "/", "(SELECT MAX(x.time) FROM sample x WHERE x.item_id=i.item_id AND x.time<{})",
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Bucket:
+    """The numbers of an item in a span that begins at `start`, in microseconds; `mean` is that of the samples."""
+
+    start: int
+    n: int
+    lo: float
+    mean: float
+    hi: float
+
+
+def items(storage: Storage) -> dict[str, Item]:
+    """The items as the database has them now; another process may have made some."""
+    return {row[0]: Item(*row) for row in storage.read("SELECT name, kind, unit, item_id FROM item")}
+
+
+def before(storage: Storage, item: Item, until: int) -> Sample | None:
+    """The last sample before a time: the state as of then."""
+    sql = DIALECTS[storage.dialect]
+    rows = storage.read(
+        f"SELECT {sql.micro.format('s.time')}, s.num, s.text FROM sample s "
+        f"WHERE s.item_id={item.item_id} AND s.time<{sql.at(until)} ORDER BY s.time DESC LIMIT 1"
+    )
+    return Sample(item.name, *rows[0]) if rows else None
+
+
+def oldest(storage: Storage, item: Item, since: int, limit: int) -> list[Sample]:
+    """The oldest samples of an item from a time on: for going through all of them in pieces."""
+    sql = DIALECTS[storage.dialect]
+    rows = storage.read(
+        f"SELECT {sql.micro.format('s.time')}, s.num, s.text FROM sample s WHERE s.item_id={item.item_id} "
+        f"AND s.time>={sql.at(max(since, SECOND))} ORDER BY s.time LIMIT {int(limit)}"
+    )
+    return [Sample(item.name, *row) for row in rows]
+
+
+def all_before(storage: Storage, until: int) -> dict[str, Sample]:
+    """The same of every item that has one."""
+    sql = DIALECTS[storage.dialect]
+    key = sql.greatest_key.format(sql.at(until))
+    rows = storage.read(
+        f"SELECT i.name, {sql.micro.format('s.time')}, s.num, s.text "
+        f"FROM item i {sql.join} sample s ON s.item_id=i.item_id AND s.time={key}"
+    )
+    return {row[0]: Sample(*row) for row in rows}
+
+
+def changes(
+    storage: Storage, since: int, until: int, items: Iterable[Item] | None = None, limit: int = 10_000
+) -> list[Sample]:
+    """What changed in a span: samples that differ from the one before of the same item, oldest first.
+
+    Of a span with more than `limit` samples the newest are looked at.
+    """
+    wanted = None if items is None else [item.item_id for item in items]
+    if wanted == []:
+        return []
+    rows = _between(storage, since, until, wanted, limit)
+    if not rows:
+        return []
+    last = {name: (one.num, one.text) for name, one in all_before(storage, rows[0].time).items()}
+    changed = []
+    for row in rows:
+        if last.get(row.item) != (row.num, row.text):
+            last[row.item] = (row.num, row.text)
+            changed.append(row)
+    return changed
+
+
+def _between(storage: Storage, since: int, until: int, items: list[int] | None, limit: int) -> list[Sample]:
+    sql = DIALECTS[storage.dialect]
+    which = "" if items is None else f"WHERE i.item_id IN ({','.join(map(str, items))}) "
+    rows = storage.read(
+        f"SELECT i.name, {sql.micro.format('s.time')}, s.num, s.text FROM item i {sql.join} sample s "
+        f"ON s.item_id=i.item_id AND s.time>={sql.at(since)} AND s.time<{sql.at(until)} {which}"
+        f"ORDER BY s.time DESC LIMIT {int(limit)}"
+    )
+    return [Sample(*row) for row in reversed(rows)]
+
+
+def durations(storage: Storage, item: Item, since: int, until: int) -> dict[str, int]:
+    """How long an item was in each state, in microseconds; the state before the span counts until its first change.
+
+    A number is told as its text. Time before the first sample ever is in no state.
+    """
+    sql = DIALECTS[storage.dialect]
+    first = before(storage, item, since + 1)
+    start = first.time if first else since
+    rows = storage.read(
+        "SELECT v, SUM(b - a) FROM (SELECT COALESCE(text, num) v, "
+        f"CASE WHEN t<{int(since)} THEN {int(since)} ELSE t END a, "
+        f"COALESCE(LEAD(t) OVER (ORDER BY t), {int(until)}) b FROM "
+        f"(SELECT {sql.micro.format('s.time')} t, s.num, s.text FROM sample s WHERE s.item_id={item.item_id} "
+        f"AND s.time>={sql.at(start)} AND s.time<{sql.at(until)}) r) d GROUP BY v"
+    )
+    return {_plain(value): int(spent) for value, spent in rows}
+
+
+def _plain(value: object) -> str:
+    return value if isinstance(value, str) else str(value).removesuffix(".0")
+
+
+def buckets(storage: Storage, item: Item, since: int, until: int, every_s: int) -> list[Bucket]:
+    """Count, least, mean and greatest number per bucket of `every_s` seconds, counted from 1970; empty ones left out.
+
+    Means that were kept when the raw rows went (`keeping.py`) are used where they fit, the raw rows after them.
+    """
+    width, end = _kept_means(storage, item, every_s)
+    kept_until = min(max(since, end * SECOND), until)
+    found = _from_means(storage, item, since, kept_until, every_s, width) if width else []
+    raw = _from_samples(storage, item, kept_until if width else since, until, every_s)
+    if found and raw and found[-1].start == raw[0].start:
+        found[-1:] = [_merged(found[-1], raw.pop(0))]
+    return found + raw
+
+
+def _kept_means(storage: Storage, item: Item, every_s: int) -> tuple[int, int]:
+    """The widest kept means that buckets of this width can be made of, and where they end, seconds; else 0, 0."""
+    rows = storage.read(f"SELECT width, MAX(start) FROM summary WHERE item_id={item.item_id} GROUP BY width")
+    fitting = [(width, start + width) for width, start in rows if every_s % width == 0]
+    return max(fitting, default=(0, 0))
+
+
+def _from_means(storage: Storage, item: Item, since: int, until: int, every_s: int, width: int) -> list[Bucket]:
+    sql = DIALECTS[storage.dialect]
+    rows = storage.read(
+        f"SELECT start {sql.div} {every_s} * {every_s} b, SUM(n), MIN(lo), SUM(mean*n)/SUM(n), MAX(hi) FROM summary "
+        f"WHERE item_id={item.item_id} AND width={width} AND start>={since // SECOND} AND start<{until // SECOND} "
+        f"GROUP BY b ORDER BY b"
+    )
+    return [_bucket(row) for row in rows]
+
+
+def _from_samples(storage: Storage, item: Item, since: int, until: int, every_s: int) -> list[Bucket]:
+    sql = DIALECTS[storage.dialect]
+    group = {
+        "mysql": f"UNIX_TIMESTAMP(s.time) DIV {every_s} * {every_s}",
+        "sqlite": f"s.time / {every_s * SECOND} * {every_s}",
+    }[storage.dialect]
+    rows = storage.read(
+        f"SELECT {group} b, COUNT(*), MIN(s.num), AVG(s.num), MAX(s.num) FROM sample s "
+        f"WHERE s.item_id={item.item_id} AND s.num IS NOT NULL AND s.time>={sql.at(since)} AND s.time<{sql.at(until)} "
+        f"GROUP BY b ORDER BY b"
+    )
+    return [_bucket(row) for row in rows]
+
+
+def _bucket(row: tuple[object, ...]) -> Bucket:
+    start, n, lo, mean, hi = (float(str(value)) for value in row)
+    return Bucket(int(start) * SECOND, int(n), lo, mean, hi)
+
+
+def _merged(one: Bucket, other: Bucket) -> Bucket:
+    n = one.n + other.n
+    mean = (one.mean * one.n + other.mean * other.n) / n
+    return Bucket(one.start, n, min(one.lo, other.lo), mean, max(one.hi, other.hi))

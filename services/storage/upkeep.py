@@ -1,0 +1,109 @@
+"""What an administrator does: make databases and accounts, take versions of the schema back, look whether all is well.
+
+Accounts are made on MariaDB and MySQL alone; a SQLite file has none.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
+
+from services.errors import ConfigError
+from services.storage import Address, Storage, open_plain, open_storage
+from services.storage.migrate import back, versions
+
+RIGHTS = "SELECT, INSERT, UPDATE, DELETE, CREATE, ALTER, DROP, INDEX"
+VIEW_RIGHTS = "SELECT, CREATE VIEW, SHOW VIEW, DROP"
+ACCOUNT = re.compile(r"[A-Za-z0-9_-]{1,32}")
+HOST = re.compile(r"[A-Za-z0-9_.:%/-]{1,255}")
+LOCAL = ("localhost", "127.0.0.1", "::1")
+
+
+def administrator(address: Address, user: str, password: str | None) -> Address:
+    """The same server, as somebody who may make databases and accounts."""
+    if address.dialect == "sqlite":
+        raise ConfigError(["a SQLite file has no accounts: who may read the file may read all of it"])
+    return replace(address, user=user, password=password, database="")
+
+
+def make_databases(address: Address, admin: Address) -> None:
+    """Both databases in UTF-8 and the writer's account; what is there stays. Its password is that of `address`."""
+    host = "localhost" if address.socket or address.host in LOCAL else "%"
+    with closing(open_plain(admin)) as server:
+        account = f"{server.quote(_checked(ACCOUNT, address.user))}@{server.quote(host)}"
+        secret = server.quote(address.password or "")
+        for name in (address.database, address.view_database):
+            server.change(f"CREATE DATABASE IF NOT EXISTS `{name}` CHARACTER SET utf8mb4")
+        server.change(
+            f"CREATE USER IF NOT EXISTS {account} IDENTIFIED BY {secret}",
+            f"GRANT {RIGHTS} ON `{address.database}`.* TO {account}",
+            f"GRANT {VIEW_RIGHTS} ON `{address.view_database}`.* TO {account}",
+        )
+
+
+def let_read(address: Address, admin: Address, reader: str, password: str, host: str = "localhost") -> None:
+    """An account that may read the views with OpenHAB's layout and nothing else; from elsewhere by TLS alone."""
+    with closing(open_plain(admin)) as server:
+        account = f"{server.quote(_checked(ACCOUNT, reader))}@{server.quote(_checked(HOST, host))}"
+        encrypted = "NONE" if host in LOCAL else "SSL"
+        server.change(
+            f"CREATE USER IF NOT EXISTS {account} IDENTIFIED BY {server.quote(password)}",
+            f"ALTER USER {account} IDENTIFIED BY {server.quote(password)} REQUIRE {encrypted}",
+            f"GRANT SELECT ON `{address.view_database}`.* TO {account}",
+        )
+
+
+def _checked(form: re.Pattern[str], text: str) -> str:
+    if not form.fullmatch(text):
+        raise ConfigError([f"expected a name of letters, digits, _ and -, got {text!r}"])
+    return text
+
+
+def version(storage: Storage) -> int:
+    """The version of the schema that a database has."""
+    return int(storage.read("SELECT COALESCE(MAX(version), 0) FROM schema_version")[0][0])
+
+
+def take_back(address: Address, to: int) -> int:
+    """From the newest version of the schema to an older one; the version before. The next to open it brings it up."""
+    newest = max(versions(address.dialect))
+    if not 1 <= to <= newest:
+        raise ConfigError([f"expected a version from 1 to {newest}, got {to}"])
+    with closing(open_storage(address)) as storage:
+        before = version(storage)
+        for number, script in list(back(address.dialect, before, to)):
+            storage.change(*script, f"DELETE FROM schema_version WHERE version={number}")
+    return before
+
+
+def look(address: Address) -> Iterator[tuple[bool, str]]:
+    """Whether each thing is well, and what it is. What cannot be used at all comes out as ConfigError."""
+    with closing(open_storage(address)) as storage:
+        yield True, f"schema version {version(storage)}, the newest"
+        yield True, f"{len(storage.items)} items"
+        yield from _look_at_server(storage) if storage.dialect == "mysql" else _look_at_file(storage)
+
+
+def _look_at_file(storage: Storage) -> Iterator[tuple[bool, str]]:
+    ((told,),) = storage.read("PRAGMA quick_check(1)")
+    yield told == "ok", f"the file: {told}"
+    ((mode,),) = storage.read("PRAGMA journal_mode")
+    yield mode == "wal", f"journal mode {mode}"
+
+
+def _look_at_server(storage: Storage) -> Iterator[tuple[bool, str]]:
+    ((server, flush, binlog, sync, mode, packet, zone),) = storage.read(
+        "SELECT @@version, @@innodb_flush_log_at_trx_commit, @@log_bin, @@sync_binlog, @@sql_mode, "
+        "@@max_allowed_packet, CONVERT_TZ('2026-01-31 07:00:00', 'UTC', 'Europe/Madrid')"
+    )
+    yield True, f"server {server}"
+    yield int(flush) == 1, f"innodb_flush_log_at_trx_commit={flush} (1: a commit is on the disk before it is answered)"
+    yield not int(binlog) or int(sync) == 1, f"binary log {'on' if int(binlog) else 'off'}, sync_binlog={sync}"
+    yield "STRICT_TRANS_TABLES" in str(mode), f"sql_mode {mode}"
+    yield int(packet) >= 16 * 1024 * 1024, f"max_allowed_packet={packet} (16 MiB or more)"
+    yield (
+        zone is not None,
+        "named time zones are " + ("there" if zone else "missing: mariadb-tzinfo-to-sql | mariadb mysql"),
+    )

@@ -1,0 +1,166 @@
+"""What stands in a square: the mean grey of its cells, the code nearest to them, and how much speaks for it.
+
+A square that looks like a marker at a distance is common; the evidence here is what keeps a keyboard's keys, a
+chessboard or a page of text from being one. Where squares come from is `squares`; who is believed is `detect`'s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.vision.codes import GRAIN, SPOT, Rows, normalised
+from services.vision.corners import sample
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+SPOTS = SPOT * np.array([-0.5, 0.0, 0.5])  # where a cell is sampled, in cells from its middle
+BESIDE = 0.3  # of a cell: how far outside the square the paper is looked for; some print with hardly a rim
+BESIDE_PX = 1.2  # and at least: there the edge's own blur ends
+AT_ONCE = 400_000  # products: of more, the matrix library makes threads, which wait for one another on a busy machine
+SMOOTHED = 0.45  # of the noise's variance is left between pixels
+NOISY = 0.8  # of a square's variance at most is believed to be noise
+LIGHTER = 0.25  # of the contrast: by this much paper is lighter than the border, or it is no edge
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """The grey of squares: `grey` (n, modules, modules), `outside` (n, 4, modules): the paper beside each side."""
+
+    grey: Array
+    outside: Array
+
+    @property
+    def inner(self) -> Array:
+        """The cells that carry the code, (n, cells)."""
+        inner = self.grey.shape[1] - 2
+        return self.grey[:, 1:-1, 1:-1].reshape(len(self.grey), inner * inner)
+
+    @property
+    def border(self) -> Array:
+        """The border's cells along each side, (n, 4, modules), corners twice."""
+        cells = self.grey
+        return np.stack((cells[:, 0], cells[:, :, -1], cells[:, -1, ::-1], cells[:, ::-1, 0]), axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """For each square the best row of the book, its correlation, and that of the best row of another id."""
+
+    row: NDArray[np.intp]
+    correlation: Array
+    second: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """For each square what does not depend on how well the code fits.
+
+    `contrast`: grey levels between light and dark cells; `dark`: share of the border's cells nearer to dark than to
+    light; `edged`: share of the outline with lighter paper beside it, `worst` the same of its worst side.
+    """
+
+    contrast: Array
+    dark: Array
+    edged: Array
+    worst: Array
+
+
+def cells(grey: Picture, squares: Array, modules: int) -> Cells:
+    """Looks into squares (n, 4, 2)."""
+    middles = np.arange(modules) + 0.5
+    spots = (middles[:, None] + SPOTS).ravel() / modules
+    across, down = np.meshgrid(spots, spots)
+    x, y = place(squares, across.ravel(), down.ravel())
+    count = len(SPOTS)
+    means = sample(grey, x, y).reshape(len(squares), modules, count, modules, count).mean(axis=(2, 4))
+    return Cells(means, _outside(grey, squares, middles / modules))
+
+
+def _outside(grey: Picture, squares: Array, share: Array) -> Array:
+    along = np.roll(squares, -1, axis=1) - squares
+    length = np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-9)
+    outward = np.stack((along[..., 1], -along[..., 0]), axis=2) / length
+    across = np.roll(length, 1, axis=1) / len(share) * BESIDE
+    start = squares + outward * np.maximum(across, BESIDE_PX)
+    at = start[:, :, None] + share[:, None] * along[:, :, None]
+    return sample(grey, at[..., 0], at[..., 1])
+
+
+def fits(inner: Array, rows: Rows) -> NDArray[np.float32]:
+    """How well cells (n, cells) correlate with each row, (n, rows)."""
+    looks = np.asarray(normalised(inner), np.float32)
+    few = max(1, AT_ONCE // max(1, rows.size))
+    return np.concatenate([looks[start : start + few] @ rows.T for start in range(0, max(1, len(looks)), few)])
+
+
+def match(inner: Array, seen: tuple[Rows, ...]) -> Match:
+    """The rows that the cells (n, cells) correlate with best, at whatever blur."""
+    best = fits(inner, seen[0])
+    for rows in seen[1:]:
+        np.maximum(best, fits(inner, rows), out=best)
+    each, count = np.arange(len(best)), best.shape[1] // 4
+    row = best.argmax(axis=1)
+    others = np.maximum.reduce([best[:, turn * count : (turn + 1) * count] for turn in range(4)])
+    others[each, row % count] = -1.0
+    return Match(row, np.asarray(best[each, row], float), np.asarray(others.max(axis=1), float))
+
+
+def evidence(found: Cells, light: NDArray[np.bool_]) -> Evidence:
+    """How much each square looks like a marker whose cells (n, cells) are light where told."""
+    inner = found.inner
+    high = (inner * light).sum(axis=1) / np.maximum(light.sum(axis=1), 1)
+    low = (inner * ~light).sum(axis=1) / np.maximum((~light).sum(axis=1), 1)
+    return _evidence(found, high, np.where(light.all(axis=1), found.border.mean(axis=(1, 2)), low))
+
+
+def appearance(found: Cells) -> Evidence:
+    """The same before any code is known: the lightest and darkest cells stand for the light and the dark ones."""
+    inner = np.sort(found.inner, axis=1)
+    few = max(1, inner.shape[1] // 8)
+    return _evidence(found, inner[:, -few:].mean(axis=1), inner[:, :few].mean(axis=1))
+
+
+def _evidence(found: Cells, high: Array, low: Array) -> Evidence:
+    contrast = high - low
+    dark = (found.border < ((high + low) / 2)[:, None, None]).mean(axis=(1, 2))
+    edged = found.outside - found.border > LIGHTER * np.maximum(contrast, 1.0)[:, None, None]
+    sides = edged.mean(axis=2)
+    return Evidence(contrast, dark, sides.mean(axis=1), sides.min(axis=1))
+
+
+def likeness(grey: Picture, square: Array, faces: NDArray[np.float32], noise: float) -> float:
+    """Share of what is seen within the border, pixel by pixel, that the code explains at its best sharpness: 0 to 1.
+
+    Letters and pictures in a frame have other shapes than cells. `noise`: the picture's, which explains nothing.
+    """
+    size = faces.shape[1]
+    shares = (np.arange(size) + 0.5) / size
+    across, down = np.meshgrid(shares, shares)
+    x, y = place(square[None], across.ravel(), down.ravel())
+    within = slice(GRAIN, -GRAIN)
+    seen = sample(grey, x, y).reshape(size, size)[within, within]
+    seen = seen - seen.mean()
+    wanted = faces[:, within, within] - faces[:, within, within].mean(axis=(1, 2), keepdims=True)
+    total = float((seen**2).sum())
+    total = max(total - SMOOTHED * noise**2 * seen.size, (1 - NOISY) * total, 1e-9)
+    together = np.clip((wanted * seen).sum(axis=(1, 2)), 0, None) ** 2
+    return float(np.max(together / np.maximum((wanted**2).sum(axis=(1, 2)), 1e-9)) / total)
+
+
+def place(squares: Array, u: Array, v: Array) -> tuple[Array, Array]:
+    """Points (u, v) of the unit square in each of the squares: x and y, (n, len(u)) (Heckbert 1989, section 2.2.3)."""
+    a, b, c, d = np.moveaxis(squares, 1, 0)
+    bend, right, low = a - b + c - d, b - c, d - c
+    area = right[:, 0] * low[:, 1] - low[:, 0] * right[:, 1]
+    area = np.where(np.abs(area) < 1e-9, 1e-9, area)
+    g = (bend[:, 0] * low[:, 1] - low[:, 0] * bend[:, 1]) / area
+    h = (right[:, 0] * bend[:, 1] - bend[:, 0] * right[:, 1]) / area
+    along, across = b - a + g[:, None] * b, d - a + h[:, None] * d
+    over = 1 + g[:, None] * u + h[:, None] * v
+    x = (along[:, :1] * u + across[:, :1] * v + a[:, :1]) / over
+    y = (along[:, 1:] * u + across[:, 1:] * v + a[:, 1:]) / over
+    return x, y

@@ -1,0 +1,110 @@
+"""Dark squares on lighter ground: the outlines in a picture that could be markers. What is in them is `reading`'s.
+
+Thresholds are local and their step follows the picture's noise, so that dim and hazy pictures need no other look. A
+small window splits a hard shadow's edge off a border, a picture shrunk by half lets it see blurred edges. An outline
+with more than four corners (a finger over the border, a shadow grown into it) is tried by every four of its sides.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+WINDOW = 7  # px of the threshold's neighbourhood: wider ones join a small marker to what is beside it
+STEPS = (3.0, 8.0)  # least and most grey levels by which a pixel must be darker than its neighbourhood
+NOISES = 2.5  # the same in standard deviations of the noise: more lets specks grow into the outline
+ROUGH = 0.03  # of an outline's length: how far it may leave the straight line between two corners
+FINEST_PX = 1.0  # and never less: an outline goes from pixel to pixel
+LEAST_ANGLE = 0.17  # sine between neighbouring sides: a square seen at more than 75 degrees cannot be read
+MOST_CORNERS = 12  # of an outline that is worth being tried by its sides
+SIDES_TRIED = 7  # the longest of them
+ROWS = 60  # of the picture that the noise is measured in
+COVERED = 0.5  # share of a square's outline that the four sides must make up
+WIDEST = 6.0  # longest by shortest side
+FOURS = np.array(list(combinations(range(SIDES_TRIED), 4)))
+
+
+def noise(grey: Picture) -> float:
+    """The standard deviation of the picture's noise, in grey levels, from neighbours in some of its rows."""
+    rows = grey[:: max(1, grey.shape[0] // ROWS)].astype(np.int16)
+    bend = np.abs(rows[:, 2:] - 2 * rows[:, 1:-1] + rows[:, :-2])
+    if not bend.size:
+        return 0.0
+    share = np.cumsum(np.bincount(bend.ravel(), minlength=2)) / bend.size
+    middle = int(np.searchsorted(share, 0.5))  # the median: edges are rare
+    below = float(share[middle - 1]) if middle else 0.0
+    return (middle - 0.5 + (0.5 - below) / (share[middle] - below)) / 0.6745 / 6**0.5 if middle else 0.0
+
+
+def squares(grey: Picture, least_px: float, *, window: int = WINDOW, step: float | None = None) -> Array:
+    """Rough outlines (n, 4, 2), clockwise in the picture, of dark squares with sides of at least `least_px`."""
+    if min(grey.shape) < 8:
+        return np.zeros((0, 4, 2))
+    below = float(np.clip(NOISES * noise(grey), *STEPS)) if step is None else step
+    dark = cv2.adaptiveThreshold(grey, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, below)
+    outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    longest, area = 4 * max(grey.shape), least_px**2 * LEAST_ANGLE
+    fours, others = [], []
+    for outline in outlines:
+        if 3 * least_px < len(outline) < longest and cv2.contourArea(outline, True) < -area:  # else a hole's
+            corners = cv2.approxPolyDP(outline, max(ROUGH * len(outline), FINEST_PX), True)[:, 0]
+            if len(corners) == 4:
+                fours.append(corners)
+            elif 4 < len(corners) <= MOST_CORNERS or len(corners) == 3:
+                finer = cv2.approxPolyDP(outline, max(ROUGH / 2 * len(outline), FINEST_PX), True)[:, 0]
+                others.append(finer if 4 < len(finer) <= MOST_CORNERS else corners)
+    found = [np.array(fours, float).reshape(-1, 4, 2)[:, ::-1], _by_sides(others)]
+    return _sound(np.concatenate(found), least_px)
+
+
+def _sound(candidates: Array, least_px: float) -> Array:
+    """Those that are convex, clockwise, not too small and not too slanted."""
+    along = np.roll(candidates, -1, axis=1) - candidates
+    length = np.linalg.norm(along, axis=2)
+    before = np.roll(along, 1, axis=1)
+    turn = before[..., 0] * along[..., 1] - before[..., 1] * along[..., 0]
+    sine = turn / np.maximum(length * np.roll(length, 1, axis=1), 1e-9)
+    large = length.max(axis=1) >= least_px
+    sound: Array = candidates[
+        (sine.min(axis=1) > LEAST_ANGLE) & large & (length.max(axis=1) < WIDEST * length.min(axis=1))
+    ]
+    return sound
+
+
+def _by_sides(polygons: list[NDArray[Any]]) -> Array:
+    """For each outline the two squares that the most of it lies on, each of four of its sides made longer."""
+    many = [polygon for polygon in polygons if len(polygon) > 4]
+    if not many:
+        return np.zeros((0, 4, 2))
+    start, along = np.zeros((2, len(many), SIDES_TRIED, 2))
+    for row, polygon in enumerate(many):
+        points = polygon[::-1].astype(float)
+        extent = np.concatenate((points[1:], points[:1])) - points
+        chosen = np.sort(np.argsort(-np.hypot(extent[:, 0], extent[:, 1]))[:SIDES_TRIED])
+        start[row, : len(chosen)], along[row, : len(chosen)] = points[chosen], extent[chosen]
+    start, along = start[:, FOURS], along[:, FOURS]  # (n, fours, 4, 2)
+    length = np.linalg.norm(along, axis=3)
+    normal = np.stack((-along[..., 1], along[..., 0]), axis=3) / np.maximum(length, 1e-9)[..., None]
+    distance = (normal * start).sum(axis=3)
+    before, before_distance = np.roll(normal, 1, axis=2), np.roll(distance, 1, axis=2)
+    slant = before[..., 0] * normal[..., 1] - before[..., 1] * normal[..., 0]
+    slant = np.where(np.abs(slant) < 1e-6, 1e-6, slant)
+    x = (before_distance * normal[..., 1] - distance * before[..., 1]) / slant
+    y = (before[..., 0] * distance - normal[..., 0] * before_distance) / slant
+    corners = np.stack((x, y), axis=3)
+    sides = np.roll(corners, -1, axis=2) - corners
+    onward = ((sides * along).sum(axis=3) > 0).all(axis=2) & (length > 0).all(axis=2)
+    around = np.linalg.norm(sides, axis=3)
+    covered = np.minimum(length / np.maximum(around, 1e-9), 1.2)
+    share = (covered * around).sum(axis=2) / np.maximum(around.sum(axis=2), 1e-9)
+    share = np.where(onward & (covered.min(axis=2) > 0.15) & (share >= COVERED), share, 0.0)
+    best = np.argsort(-share, axis=1)[:, :2]
+    rows = np.arange(len(many))[:, None]
+    return corners[rows, best][share[rows, best] > 0]

@@ -1,0 +1,156 @@
+"""Views of one marker, put together by where the camera stood: the frames of a place become one sight.
+
+Their corners are averaged robustly, and their scatter tells the noise. Frames of one place in which the marker is
+not where it was are another sight: it was moved, it is another one of the same kind, or one of them is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import asin, degrees, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.vision.frames import Transform
+from services.vision.lens import Lens
+
+Array = NDArray[np.float64]
+
+RANDOM_PX = 0.02  # corner noise per axis of one frame, new in each, where their own scatter does not tell
+FIXED_PX = 0.018  # and what all frames of a place share: the pixel grid, the lens calibration
+FIXED_SIDES = 0.0003  # of the marker's side, shared too: paper and print
+FIXED_SHARE = 0.6  # of the random noise: what makes a picture worse does it to both; measured from .02/.026 to .07/.04
+KNOWN_FROM = 8.0  # numbers that RANDOM_PX counts as against the frames' own scatter
+SAME_PLACE_M, SAME_PLACE_DEG = 0.005, 0.2  # readings that differ by less are one place, read with a jitter
+SAME_FOCAL = 1e-3  # share; a zoom measured anew in each frame is the same zoom
+STAYED_PX, STAYED_SIDES = 1.0, 0.03  # corners of one place that are farther apart are not of one marker at rest
+HUBER = 1.5  # standard deviations of a frame from where it weighs less
+WEIGHINGS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One sighting: `corners` (4, 2) as `detect` gives them, seen through `lens` from `camera` (T_AC), `at` seconds.
+
+    `size_m` is the side of the printed black square, `angle_noise_deg` how well the readings are known of pan and tilt,
+    which turn about `axes` (2, 3) in the apartment; None: about any. `focal_doubt` is the standard deviation of the
+    lens's focal length as a share of it. A picture that was `enlarged` has coarser corners by that factor.
+    """
+
+    lens: Lens
+    camera: Transform
+    corners: Array
+    size_m: float
+    angle_noise_deg: float = 0.05
+    focal_doubt: float = 0.0
+    enlarged: float = 1.0
+    axes: Array | None = None
+    at: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sights:
+    """The views as arrays of g rows, those of one place averaged to one."""
+
+    rays: Array  # (g, 4, 2), normalised
+    rotation: Array  # (g, 3, 3), R_AC
+    lens_at: Array  # (g, 3), m
+    size: Array  # (g,), m
+    noise: Array  # (g,), rad, of a corner
+    swing: Array  # (g, 3, 3), rad: columns are turns of the camera, in its own frame, of one standard deviation each
+    focal_doubt: Array  # (g,), share
+
+    def __len__(self) -> int:
+        return len(self.rays)
+
+    def chosen(self, rows: Sequence[int]) -> Sights:
+        """Only these."""
+        index = np.asarray(rows, int)
+        return Sights(**{name: value[index] for name, value in vars(self).items()})
+
+
+def by_place(views: Sequence[View]) -> list[list[int]]:
+    """Which views are of one place, and of a marker at rest: their indexes, in the order of their times."""
+    places: list[list[int]] = []
+    for index in sorted(range(len(views)), key=lambda index: views[index].at):
+        view = views[index]
+        known = next((p for p in places if _from_there(views[p[0]], view) and _stayed(views[p[-1]], view)), None)
+        if known is None:
+            places.append([index])
+        else:
+            known.append(index)
+    return places
+
+
+def gather(places: Sequence[Sequence[View]]) -> Sights:
+    """The views of each place as one sight."""
+    first = [place[0] for place in places]
+    averaged = [average(np.array([view.corners for view in p], float), p[0].enlarged) for p in places]
+    looking = [_mean(np.array([view.camera.rotation for view in place])) for place in places]
+    return Sights(
+        rays=np.array([v.lens.rays(c) for v, (c, _) in zip(first, averaged, strict=True)]).reshape(-1, 4, 2),
+        rotation=np.array(looking).reshape(-1, 3, 3),
+        lens_at=np.array([v.camera.translation for v in first]).reshape(-1, 3),
+        size=np.array([v.size_m for v in first], float),
+        noise=np.array([n / v.lens.focal for v, (_, n) in zip(first, averaged, strict=True)], float),
+        swing=np.array([_swing(v, turned) for v, turned in zip(first, looking, strict=True)]).reshape(-1, 3, 3),
+        focal_doubt=np.array([v.focal_doubt for v in first], float),
+    )
+
+
+def _swing(view: View, rotation: Array) -> Array:
+    noise = np.radians(view.angle_noise_deg)
+    if view.axes is None:
+        return np.asarray(noise * np.eye(3), float)
+    return np.column_stack((noise * rotation.T @ view.axes.T, np.zeros(3)))
+
+
+def average(corners: Array, enlarged: float = 1.0) -> tuple[Array, float]:
+    """The corners (4, 2) of k frames (k, 4, 2), frames that are off weighing less; and their noise per axis, pixels.
+
+    Of a picture that was `enlarged` so many times the noise is larger too.
+    """
+    frames = len(corners)
+    centre = np.median(corners, axis=0)
+    weights = np.ones(frames)
+    for _ in range(WEIGHINGS if frames > 2 else 0):
+        off = np.sqrt(((corners - centre) ** 2).mean(axis=(1, 2)))
+        usual = max(float(np.median(off)), RANDOM_PX * enlarged)
+        weights = np.minimum(1.0, HUBER * usual / np.maximum(off, 1e-9))
+        centre = np.einsum("k,kij->ij", weights, corners) / weights.sum()
+    if frames == 2:
+        centre = corners.mean(axis=0)
+    squares = float((weights[:, None, None] * (corners - centre) ** 2).sum())
+    random = (KNOWN_FROM * (RANDOM_PX * enlarged) ** 2 + squares) / (KNOWN_FROM + 8 * (frames - 1))
+    side = float(np.linalg.norm(centre[0] - centre[2])) / sqrt(2)
+    fixed = (FIXED_PX * enlarged) ** 2 + FIXED_SHARE**2 * random + (FIXED_SIDES * side) ** 2
+    return centre, sqrt(random / float(weights.sum()) + fixed)
+
+
+def turned_deg(one: Array, other: Array) -> float:
+    """The angle between two rotations; by its chord, which is exact for small angles too."""
+    return degrees(2 * asin(min(1.0, float(np.linalg.norm(one - other)) / sqrt(8))))
+
+
+def _from_there(one: View, other: View) -> bool:
+    return (
+        one.size_m == other.size_m
+        and abs(one.lens.focal / other.lens.focal - 1) < SAME_FOCAL
+        and float(np.linalg.norm(one.camera.translation - other.camera.translation)) < SAME_PLACE_M
+        and turned_deg(one.camera.rotation, other.camera.rotation) < SAME_PLACE_DEG
+    )
+
+
+def _stayed(one: View, other: View) -> bool:
+    corners = np.asarray(one.corners, float)
+    side = float(np.linalg.norm(corners[0] - corners[2])) / sqrt(2)
+    limit = max(STAYED_PX, STAYED_SIDES * side)
+    return not float(np.abs(corners - other.corners).max()) > limit  # also what is not a number: refused later
+
+
+def _mean(rotations: Array) -> Array:
+    """The rotation nearest to all of them (n, 3, 3): a reading that jitters is better than each of its values."""
+    left, _, right = np.linalg.svd(rotations.sum(axis=0))
+    return np.asarray(left @ right, float)

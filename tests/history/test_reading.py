@@ -1,0 +1,156 @@
+"""What was, as the day of `tests/storage/day.py` has it, on both databases."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import pytest
+
+from services.history.answers import answer
+from services.payloads import HistoryGet, stamp
+from services.storage import Batch, Item, Sample, Storage, open_storage, reading
+from tests.databases import Database
+from tests.storage import day
+from tests.storage.day import at
+from tests.storage.test_queries import play_the_day
+
+US = 1_000_000
+NOW = at("10:00")
+
+
+def us(clock: str) -> int:
+    return round(at(clock) * US)
+
+
+@pytest.fixture
+def storage(database: Database) -> Iterator[Storage]:
+    play_the_day(database)
+    opened = open_storage(database.address)
+    yield opened
+    opened.close()
+
+
+def clocks(samples: list[Sample]) -> list[tuple[str, object]]:
+    """Times without the day, and the state."""
+    return [(stamp(one.time / US)[11:-1].removesuffix(".000"), one.text or one.num) for one in samples]
+
+
+def ask(storage: Storage, **question: object) -> object:
+    reply = answer(storage, HistoryGet.model_validate({"id": "q", **question}), NOW)
+    assert reply.error is None
+    return reply
+
+
+@pytest.mark.parametrize(
+    ("item", "clock", "state"),
+    [("Lab_Temp", "07:59:59", "UNDEF"), ("Lab_Temp", "07:00:01", 21.5), ("Lab_Temp", "07:00", 20.5),
+     ("Kitchen_Light", "12:00", "OFF"), ("Cam1_Goto", "12:00", "Salón"), ("Cam1_Goto", "06:00", None)],
+)  # fmt: skip
+def test_the_state_before_a_time(storage: Storage, item: str, clock: str, state: object) -> None:
+    found = reading.before(storage, storage.items[item], us(clock))
+    assert (found and (found.text or found.num)) == state
+
+
+def test_what_changed_between_two_times(storage: Storage) -> None:
+    found = reading.changes(storage, us("07:10"), us("07:20"))
+    assert [(one.item, *clocks([one])[0]) for one in found] == [
+        ("Front_Door", "07:14:58", "OPEN"),
+        ("Kitchen_Light", "07:15:00.250", "ON"),
+        ("Front_Door", "07:15:02", "CLOSED"),
+    ]
+
+
+def test_a_repeated_value_is_no_change_even_at_the_beginning_of_a_span(storage: Storage) -> None:
+    lab = [storage.items["Lab_Temp"]]
+    assert clocks(reading.changes(storage, us("08:10"), us("09:30"), lab)) == [("08:30:00.250", 21.0)]
+    assert reading.changes(storage, us("08:59"), us("09:30"), lab) == []
+    assert reading.changes(storage, us("08:59"), us("09:30"), []) == []
+
+
+@pytest.mark.parametrize(
+    ("item", "since", "until", "wanted"),
+    [
+        ("Kitchen_Light", "06:00", "09:00", {"ON": 7200, "OFF": 3000}),
+        ("Kitchen_Light", "06:20", "06:30", {"ON": 600}),
+        ("Kitchen_Light", "05:00", "06:00", {}),
+        ("Front_Door", "07:14:58", "07:15:10", {"OPEN": 4, "CLOSED": 8}),
+        ("Hall_Dimmer", "07:30", "08:30", {"60": 1800, "100": 1800}),
+    ],
+)
+def test_how_long_in_which_state(storage: Storage, item: str, since: str, until: str, wanted: dict[str, float]) -> None:
+    spent = {state: round(us_ / US, 3) for state, us_ in
+             reading.durations(storage, storage.items[item], us(since), us(until)).items()}  # fmt: skip
+    assert spent == wanted
+
+
+def test_buckets_leave_out_what_is_no_number_and_empty_ones(storage: Storage) -> None:
+    found = reading.buckets(storage, storage.items["Lab_Temp"], us("05:00"), us("10:00"), 7200)
+    assert [(stamp(b.start / US)[11:16], b.n, b.lo, round(b.mean, 4), b.hi) for b in found] == [
+        ("06:00", 3, 20, 20.6667, 21.5), ("08:00", 3, 21, 21.3333, 22),
+    ]  # fmt: skip
+
+
+def test_kept_means_and_raw_rows_make_one_row_of_buckets(storage: Storage) -> None:
+    """As after the job of `keeping.py`: the first two hours are means of 300 s, their samples are gone."""
+    lab = storage.items["Lab_Temp"]
+    whole = reading.buckets(storage, lab, us("05:00"), us("10:00"), 3600)
+    early = storage.samples("Lab_Temp", until=us("07:00"))
+    values = ",".join(f"({lab.item_id},300,{s.time // US},1,{s.num},{s.num},{s.num},{s.num})" for s in early)
+    storage.change(f"INSERT INTO summary VALUES {values}")
+    sql = reading.DIALECTS[storage.dialect]
+    storage.change(f"DELETE FROM sample WHERE item_id={lab.item_id} AND time<{sql.at(us('07:00'))}")
+    assert reading.buckets(storage, lab, us("05:00"), us("10:00"), 3600) == whole
+    assert reading.buckets(storage, lab, us("05:00"), us("10:00"), 700)[0].start > us("06:30")  # 300 does not divide it
+
+
+def test_an_item_that_another_process_made_is_found(storage: Storage, database: Database) -> None:
+    other = open_storage(database.address)
+    other.add_items([Item("New", "Number", "W")])
+    other.write(Batch([Sample("New", us("09:00"), 5.0, None)]))
+    other.close()
+    assert ask(storage, item="New", what="last").samples == [(stamp(at("09:00")), 5.0)]
+
+
+def test_the_newest_samples_of_a_span_come_oldest_first(storage: Storage) -> None:
+    reply = ask(storage, item="Lab_Temp", since=stamp(at("06:30")), until=stamp(at("09:00")), limit=2)
+    assert reply.samples == [(stamp(at("08:00")), 22.0), ("2026-01-31T08:30:00.250Z", 21.0)]
+    assert reply.unit == "°C"
+
+
+def test_the_plain_question_of_the_contract(storage: Storage) -> None:
+    reply = ask(storage, item="Kitchen_Light", since=None, until=None, limit=None, every=None)
+    assert reply.samples == [
+        (stamp(at(pair.split()[0])), pair.split()[1]) for pair in day.STATES["Kitchen_Light"].split("; ")
+    ]
+
+
+def test_every_gives_means_and_their_buckets(storage: Storage) -> None:
+    reply = ask(storage, item="Hall_Dimmer", since=stamp(at("06:00")), until=stamp(at("09:00")), every=7200)
+    assert reply.samples == [(stamp(at("06:00")), 30.0), (stamp(at("08:00")), 100.0)]
+    assert reply.buckets[0] == (stamp(at("06:00")), 2, 0.0, 30.0, 60.0)
+
+
+def test_durations_and_changes_by_question(storage: Storage) -> None:
+    light = ask(storage, item="Kitchen_Light", what="durations", since=stamp(at("06:00")), until=stamp(at("09:00")))
+    assert light.durations["ON"] == 7200.0
+    changed = ask(storage, what="changes", since=stamp(at("08:40")), until=stamp(at("10:00")))
+    assert changed.changes == [("Kitchen_Light", "2026-01-31T08:45:00.250Z", "OFF")]
+
+
+WRONG = [
+    ({"item": "Nothing"}, "nothing is stored of 'Nothing'"),
+    ({"item": None}, "nothing is stored of None"),
+    ({"item": "Lab_Temp", "since": "yesterday"}, "since: expected a time like"),
+    ({"item": "Lab_Temp", "until": "2026-01-31T07:00:00"}, "until: expected a time like"),
+    ({"item": "Lab_Temp", "since": "9999-12-31T23:59:59Z"}, "since: expected a time from 1970 to 2038"),
+    ({"item": "Lab_Temp", "since": "2026-02-01T00:00:00Z", "until": "2026-01-31T00:00:00Z"}, "expected a time before"),
+    ({"item": "Lab_Temp", "since": "2026-01-01T00:00:00Z", "every": 1}, "expected at most 5000 buckets"),
+]
+
+
+@pytest.mark.parametrize(("question", "told"), WRONG, ids=itertools.count())
+def test_a_question_without_an_answer_is_told_why(storage: Storage, question: dict[str, object], told: str) -> None:
+    reply = answer(storage, HistoryGet.model_validate({"id": "q", **question}), NOW)
+    assert reply.samples == []
+    assert told in (reply.error or "")
