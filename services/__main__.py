@@ -17,7 +17,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, stored, topics
 from services.bus import Message
-from services.command_line import mission, openhab, zoom
+from services.command_line import calibrate, mission, openhab, zoom
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -31,7 +31,6 @@ app = typer.Typer(
 Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
 Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
 CONFIG = Path("config/apartment.yaml")
-CALIBRATION_S = 600.0
 STATUS_S = 1.0  # how long retained states may take to come
 out = Console(soft_wrap=True, highlight=False)
 err = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -175,33 +174,10 @@ def probe(
 
 
 stored.add_to(app)
+calibrate.app.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom.zoom)
+app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(mission.app, name="mission")
 app.add_typer(openhab.app, name="openhab")
-calibrate = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
-app.add_typer(calibrate, name="calibrate")
-
-
-@calibrate.command(epilog="Example: apartment calibrate ptz ip1 --yes-move")
-def ptz(
-    camera: str,
-    yes_move: Annotated[bool, typer.Option("--yes-move", help="It may move; else the terminal is asked.")] = False,
-    config: Config = CONFIG,
-) -> None:
-    """Turn a camera with every speed and keep what that teaches: speeds, delays, accelerations, smallest step."""
-    from services.camera.ptz import command  # for this command alone
-
-    apartment = load(config, (f"camera-{camera}",))
-
-    def ordered() -> bool:
-        with client.connected(apartment.bus, (topics.CAMERA_ORDER_RESULT.filter,)) as bus:
-            result = bus.order(camera, "CalibratePtz", "True", timeout_s=CALIBRATION_S, tell=_tell_order)
-        return result.state == "done"
-
-    if not command.run(out, camera, apartment.state, ordered, yes_move=yes_move):
-        raise typer.Exit(1)
-
-
-calibrate.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom.zoom)
 
 
 def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:

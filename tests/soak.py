@@ -88,6 +88,7 @@ def bridge() -> Iterator[Turn]:
         yield traffic.turn
 
 
+@contextmanager
 def writer(trial: Callable[[writer_trials.Site, random.Random], float]) -> Iterator[Turn]:
     """Turns with the writer, its broker and its database alone."""
     with tempfile.TemporaryDirectory() as name, writer_trials.site(Path(name)) as one:

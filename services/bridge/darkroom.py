@@ -22,6 +22,7 @@ from services.bridge.viewer import Viewer
 from services.bus import Message
 
 MAP, META, STATIC_MAP = "/map", "/map_metadata", "/static_map"
+LEAVE_S = 2.0  # saying goodbye to a master that may hang
 LOG_FORMAT = "%(asctime)s.%(msecs)03d %(levelname)-7s %(name)s: %(message)s"
 
 
@@ -73,7 +74,9 @@ def run(wanted: Wanted, connection: Connection, every_s: float) -> None:
     stopping.set()
     for one in viewers.values():
         one.end()
-    node.close()
+    leaving = threading.Thread(target=node.close, daemon=True)
+    leaving.start()
+    leaving.join(LEAVE_S)
     os._exit(0)  # threads of rospy would hold up the end
 
 

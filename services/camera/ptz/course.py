@@ -12,6 +12,7 @@ from services.camera.requests import Reading, Reply
 
 PAN, TILT, ZOOM = range(3)
 READ_DEG = 0.08  # the resolution, and a little dither
+ZOOM_SLOWS_S = 0.1  # coarse readings do not teach how long zoom takes to stop
 TIME_S = 0.02  # what is left of the timing of a command or a reading when all that is learnt is taken off
 
 
@@ -61,7 +62,8 @@ class Course:
             if told and told[-1].level == 0:
                 before = max((abs(one.level) for one in told), default=0)
                 last = abs(told[-2].level) if len(told) > 1 else before
-                ends.append(told[-1].at + max(0.0, pace.other(STOP_LATE)) + pace.change(last))
+                slowing = max(ZOOM_SLOWS_S if axis == ZOOM else 0.0, pace.change(last))
+                ends.append(told[-1].at + max(0.0, pace.other(STOP_LATE)) + slowing)
         return max(ends)
 
     def doubt(self, axis: int, when: float) -> float:

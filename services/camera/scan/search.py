@@ -24,7 +24,7 @@ from services.camera.scan.source import Source, Spot
 from services.errors import DeviceError
 from services.payloads import Place, ScanState
 
-ANALYSE_S = 30.0  # longest wait for the last frames to be looked at
+ANALYSE_S = 30.0  # longest wait for the next frame to be looked at
 LIGHT_S = 1.5  # after a change of the picture's mode it exposes anew: 1 to 2 s
 BACK_S = 180.0  # a camera that went away may be restarting: 40 to 105 s were seen
 PATIENCE = 3  # times that it may go away in one scan
@@ -216,11 +216,13 @@ class Scan:
 
     def _all_there(self, now: float) -> Plan[float]:
         """Until every frame has come and has been looked at."""
-        limit = now + ANALYSE_S
+        limit, done = now + ANALYSE_S, self.findings.analysed
         self.gather()
         while self.source.pending(now) or self.findings.analysed < len(self.findings.taken):
+            if self.findings.analysed > done:
+                limit, done = now + ANALYSE_S, self.findings.analysed
             if now > limit:
-                raise Away("the frames were not looked at in time")
+                raise DeviceError("the frames are not looked at: no worker answers")
             now = yield from wait(now + STEP_S)
             self.gather()
         return now
