@@ -110,6 +110,7 @@ class Calibrator:
             config.limits,
             self.trips.skill,
             config.settle_s or SETTLE_S,
+            config.reading_noise_deg,
             self._say_touring,
         )
 

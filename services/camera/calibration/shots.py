@@ -80,18 +80,26 @@ def compared(wide: bytes, zoomed: bytes, how: How) -> Plan[tuple[Magnification, 
     return study(lambda: measure(how.upright(wide), how.upright(zoomed)))
 
 
-def markers_in(jpegs: Sequence[bytes], how: How, dictionary: str, targets: Sequence[int]) -> MarkerShot:
-    """Looks for markers in pictures of the same; corners are their mean, of markers that the first shows once."""
+def markers_in(
+    jpegs: Sequence[bytes], how: How, dictionary: str, known: Sequence[int], wanted: int | None
+) -> MarkerShot:
+    """Looks for known markers in pictures of the same; corners are their mean, of markers that the first shows once.
+
+    A marker that is hard to see is only looked for, which takes long, when it is the `wanted` one; None: all are.
+    """
     first = how.upright(jpegs[0])
-    found = {marker: [corners] for marker, corners in _once(first, dictionary, targets).items()}
-    for jpeg in jpegs[1:] if found else ():  # what the first does not show is not looked for again: that takes longest
+    seen = {marker: corners for marker, corners in _once(first, dictionary, None).items() if marker in known}
+    if wanted is None or wanted not in seen:
+        seen = {**seen, **_once(first, dictionary, known if wanted is None else [wanted])}
+    found = {marker: [corners] for marker, corners in seen.items()}
+    for jpeg in jpegs[1:] if found else ():
         for marker, corners in _once(how.upright(jpeg), dictionary, sorted(found)).items():
             found[marker].append(corners)
     mean = {marker: np.mean(corners, axis=0) for marker, corners in found.items() if 2 * len(corners) > len(jpegs)}
     return MarkerShot((first.shape[1], first.shape[0]), pictures.thumbnail(first, THUMB_PX), mean)
 
 
-def _once(image: pictures.Image, dictionary: str, targets: Sequence[int]) -> dict[int, Array]:
+def _once(image: pictures.Image, dictionary: str, targets: Sequence[int] | None) -> dict[int, Array]:
     seen = detect(image, dictionary, targets)
     ids = [one.marker for one in seen]
     return {one.marker: np.asarray(one.corners, float) for one in seen if ids.count(one.marker) == 1}
