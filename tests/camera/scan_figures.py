@@ -6,6 +6,7 @@ kept is told beside each figure, since a machine that cannot draw the pictures i
 
 from __future__ import annotations
 
+import json
 import random
 import tempfile
 import time
