@@ -20,3 +20,5 @@ MAGNIFICATION = 0.002  # share, median
 FLIPPED = 0.02  # of the orientations that are said to be certain
 INSIDE, INSIDE_BY = 0.90, 0.05  # of the errors in the 90 % ellipsoid
 CALIBRATED_FOCAL = 0.005  # share by which a calibrated level's focal length is off at most
+LENS = 0.005  # share by which a calibrated lens's focal lengths are off at most
+MOUNT_M, MOUNT_DEG = 0.010, 0.3  # a calibrated mount, median, from five markers that were put a centimetre beside

@@ -23,6 +23,7 @@ from services import client, document
 from services.client import FINAL, Client
 from services.command_line import prints
 from services.command_line.prints import Book, Inner, Kind, Side, Squares, squares_of
+from services.command_line.zoom import zoom
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.payloads import Calibration, OrderResult
@@ -37,6 +38,9 @@ CONFIG = Path("config/apartment.yaml")
 MOTORS_S, TOUR_S, SLACK_S = 600.0, 1800.0, 120.0
 BAR, FULL, EMPTY = 30, "#", "."
 ASK = "May {} turn now? It looks for the markers all around, for some minutes, and returns to where it looked."
+
+
+app.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom)
 
 
 @app.command(epilog="Example: apartment calibrate ptz ip1 --yes-move")
@@ -103,7 +107,7 @@ def mount(
         out.print(told.said, style="yellow")
     _copy(told.report, report or Path(f"{camera}-mount.html"))
     if not keep:
-        _write_mount(config, camera, told.mount or {})
+        write_mount(config, camera, told.mount or {})
 
 
 app.command(epilog="Example: apartment calibrate board --out board.pdf")(prints.board)
@@ -215,21 +219,26 @@ def _copy(report: str | None, to: Path) -> None:
     out.print(f"report: {to}")
 
 
-def _write_mount(config: Path, camera: str, found: dict[str, Any]) -> None:
+def write_mount(config: Path, camera: str, found: dict[str, Any]) -> None:
     """Into the configuration's text, the old file kept; ConfigError when the text does not lend itself to that."""
     from services.camera.calibration import files
     from services.camera.calibration.section import with_mount
 
     try:
         text = with_mount(config.read_text(encoding="utf-8"), camera, found)
+        backup = files.kept(config, time())
+        files.replaced(config, text.encode())
+        if _mount_in(config, camera) != found and backup is not None:
+            files.replaced(config, backup.read_bytes())
+            raise ValueError("the mount could not be put there, the file is as it was")
     except ValueError as error:
         lines = [f"  {key}: {value}" for key, value in found.items()]
         raise ConfigError(
             [f"{config}:1: {error}; put it there by hand:", f"cameras.{camera}.mount:", *lines]
         ) from error
-    backup = files.kept(config, time())
-    files.replaced(config, text.encode())
-    if document.read(config).value["cameras"][camera]["mount"] != found and backup is not None:
-        backup.replace(config)
-        raise ConfigError([f"{config}:1: the mount could not be put there; the file is as it was"])
     out.print(f"{config}: the mount is written there; the old file is {backup}")
+
+
+def _mount_in(config: Path, camera: str) -> Any:
+    read_back = document.read(config)
+    return None if read_back.faults else read_back.value["cameras"][camera].get("mount")
