@@ -30,7 +30,7 @@ from services.bus.mqtt import MqttBus
 from services.peers import mosquitto
 from services.runner import Runner
 from tests.bridge import bench as bridge_bench
-from tests.camera import goal_figures
+from tests.camera import goal_figures, scan_figures
 
 MESSAGES = 20_000
 WINDOW = 500  # of the publisher
@@ -177,8 +177,12 @@ def main() -> None:
     Console(width=None if sys.stdout.isatty() else 170).print(goals_table(moves))
     bridged = list(bridge_bench.rows())
     Console(width=None if sys.stdout.isatty() else 170).print(bridge_bench.table(bridged))
+    scans = scan_figures.rows()
+    Console(width=None if sys.stdout.isatty() else 170).print(scan_figures.table(scans))
     figured = [{**asdict(figure), "ratio": figure.ratio} for figure in figures]
-    given.json.write_text(json.dumps([*figured, *map(asdict, moves), *map(asdict, bridged)], indent=1))
+    given.json.write_text(
+        json.dumps([*figured, *map(asdict, moves), *map(asdict, bridged), *scan_figures.plain(scans)], indent=1)
+    )
 
 
 def goals_table(moves: list[goal_figures.Row]) -> Table:
