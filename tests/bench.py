@@ -31,6 +31,7 @@ from services.peers import mosquitto
 from services.runner import Runner
 from tests.bridge import bench as bridge_bench
 from tests.camera import goal_figures
+from tests.vision import bench as vision_bench
 
 MESSAGES = 20_000
 WINDOW = 500  # of the publisher
@@ -177,8 +178,12 @@ def main() -> None:
     Console(width=None if sys.stdout.isatty() else 170).print(goals_table(moves))
     bridged = list(bridge_bench.rows())
     Console(width=None if sys.stdout.isatty() else 170).print(bridge_bench.table(bridged))
+    seen = list(vision_bench.rows())
+    Console(width=None if sys.stdout.isatty() else 170).print(vision_bench.table(seen))
     figured = [{**asdict(figure), "ratio": figure.ratio} for figure in figures]
-    given.json.write_text(json.dumps([*figured, *map(asdict, moves), *map(asdict, bridged)], indent=1))
+    given.json.write_text(
+        json.dumps([*figured, *map(asdict, moves), *map(asdict, bridged), *map(asdict, seen)], indent=1)
+    )
 
 
 def goals_table(moves: list[goal_figures.Row]) -> Table:

@@ -27,6 +27,7 @@ from tests.camera import trials as camera_trials
 from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
 from tests.vision import positions
+from tests.vision import trials as detector_trials
 
 LONGEST_S = 600.0
 HANGING = ("a", "b", "c", "d")
@@ -142,6 +143,7 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "broker-kills-backlog": (lambda: writer(lambda one, rng: lost_by_the_broker(one, rng, backlog=True)), 10, "% lost"),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
+    "detector": (detector_trials.in_numbers, 100, "false markers in 50 frames"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 
