@@ -152,7 +152,7 @@ def rubbish_topic(rng: random.Random) -> str:
     levels = {"cam": rng.choice(["ip1", "ip2", "x" * 50]), "service": rng.choice(["nobody", "a-b"]), "component": "x/y",
               "item": rng.choice(["Kitchen_Light", "Hall_Dimmer", "No_Such_Item", "Lamp_Color"]),
               "key": rng.choice(["Goto", "Scan", "Nonsense"]), "marker": str(rng.randrange(2000)),
-              "platform": "sensor", "entity": "x"}  # fmt: skip
+              "platform": "sensor", "entity": "x", "robot": rng.choice(["tiago", "nobody"]), "id": "q"}  # fmt: skip
     return re.sub(r"<(\w+)>", lambda m: levels[m[1]], row.pattern) + rng.choice(["", "", "", "/more", "é"])
 
 
