@@ -17,7 +17,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, stored, topics
 from services.bus import Message
-from services.command_line import calibrate, mission, openhab
+from services.command_line import calibrate, mission, openhab, zoom
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -132,18 +132,35 @@ def order(
 def scan(
     camera: str,
     target: Annotated[list[int], typer.Option(help="A marker; repeat for more.")],
+    full: Annotated[bool, typer.Option("--full", help="Every place, in both picture modes.")] = False,
+    plot: Annotated[Path | None, typer.Option(help="Draw a plan with what was found into this PNG file.")] = None,
+    world: Annotated[Path | None, typer.Option(help="The file with the rooms; default: the simulated one.")] = None,
     config: Config = CONFIG,
     json: Json = False,
 ) -> None:
     """Look for markers with a camera; exit 1 when one was not found."""
-    filters = (topics.CAMERA_ORDER_RESULT.filter, topics.CAMERA_SCAN_RESULT.filter)
-    with client.connected(load(config).bus, filters) as bus:
-        result = bus.order(camera, "Scan", {"targets": target}, timeout_s=600.0, tell=None if json else _tell_order)
-        found = {message.topic: message for message in bus.seen if message.topic.endswith("/scan/result")}
+    from services import scanned  # it brings OpenCV
+
+    apartment = load(config)
+    if camera not in apartment.cameras:
+        raise typer.BadParameter(f"expected one of {', '.join(apartment.cameras) or 'none'}, got {camera!r}")
+    filters = [row.filter_for(cam=camera) for row in (topics.CAMERA_ORDER_RESULT, *scanned.HEARD)]
+    with client.connected(apartment.bus, filters) as bus:
+        wish = {"targets": target, "full": full}
+        result = bus.order(camera, "Scan", wish, timeout_s=600.0, tell=None if json else _tell_order)
+        heard = [message for message in bus.seen if not message.topic.endswith("/order_result")]
+    found = {read.payload.marker: read.message for read in _scan_results(heard)}
     for message in found.values():
         out.print_json(message.payload.decode()) if json else out.print(topics.read(message, message.received).payload)
+    if plot is not None:
+        scanned.plot(apartment, camera, heard, plot, world)
     if result.state != "done" or not found:
         raise typer.Exit(1)
+
+
+def _scan_results(heard: list[Message]) -> list[topics.Read]:
+    reads = (topics.read(message, message.received) for message in heard)
+    return [one for one in reads if one.topic is topics.CAMERA_SCAN_RESULT]
 
 
 @app.command(epilog="Example: apartment probe ip1 --url http://192.0.2.9 --user ros")
@@ -174,6 +191,7 @@ def probe(
 
 
 stored.add_to(app)
+calibrate.app.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom.zoom)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(mission.app, name="mission")
 app.add_typer(openhab.app, name="openhab")

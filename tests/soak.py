@@ -12,7 +12,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from services.virtual import VirtualApartment
 from tests import trials
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
+from tests.camera.scan.scenes import scan_a_scene
 from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
 from tests.vision import mount_trials, positions
@@ -144,6 +145,7 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
     "calibration": (mount_trials.calibrations, 150, "mm off, of the mount"),
+    "scenes": (lambda: nullcontext(lambda rng: scan_a_scene(rng)), 24, "s, virtual"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 

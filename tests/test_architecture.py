@@ -65,6 +65,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage"),
     "services.openhab": SERVICE,
+    "services.hubs": SERVICE,
     "services.mission": (*SERVICE, "services.floor", "services.robot_places"),
     "services.dashboard": SERVICE,
     "services.simulators": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
@@ -77,6 +78,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.command_line": ("services",),
     "services.virtual": ("services",),
     "services.demo": ("services",),
+    "services.scanned": ("services",),
     "services.pytest_plugin": ("services",),
     "services.__main__": ("services",),
 }
@@ -96,6 +98,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.camera.web.",
         "services.camera.probe.",
         "services.openhab.rest",
+        "services.openhab.live",
     ),
     "cv2": (
         "services.vision.",
@@ -166,6 +169,7 @@ PURE = (
     "services.persistence.rows", "services.persistence.seen", "services.persistence.strategies",
     "services.persistence.cron", "services.persistence.filters", "services.persistence.decisions",
     "services.history.answers", "services.history.plot", "services.storage.reading", *OPENHAB_PURE,
+    "services.hubs.homeassistant", "services.hubs.homie",
     "services.dashboard.view", "services.mission.plan", "services.mission.state", "services.mission.events",
     "services.mission.moment", "services.mission.standing", "services.mission.memory", "services.mission.telling",
     "services.simulators.agenda", "services.simulators.climate", "services.simulators.robot.route",

@@ -54,7 +54,8 @@ class Outgoing:
         if not self._waiting:
             return
         with self._lock:
-            data, self._waiting = b"".join(self._waiting), []
+            data = self._waiting[0] if len(self._waiting) == 1 else b"".join(self._waiting)
+            self._waiting = []
             gone = [connection for connection in self._greeted if not self._write(connection, data)]
         self._close(gone)
 

@@ -123,9 +123,10 @@ class Rule(Section):
         return re.compile(text.replace(r"/\#", r"(?:/.*)?").replace(r"\#", ".*").replace(r"\+", "[^/]+"))
 
 
-@dataclass(frozen=True)
+@dataclass
 class Heard:
-    """A bus message that was read: `row` and `levels` where the topic table knows it."""
+    """A bus message that was read: `row` and `levels` where the topic table knows it. Nobody changes it; frozen it
+    would cost a microsecond of each message more."""
 
     message: Message
     payload: str | bytes

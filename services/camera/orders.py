@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, TakeLens
+from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, CalibrateZoom, TakeLens
 from services.camera.commands import HideLens, PlaySound, RecordSound, VideoMode
 from services.camera.places import name_of
 from services.camera.requests import Direction, Refused, SetPicture
@@ -120,7 +120,7 @@ class Calibrate:
     """Learn the motors: turn with every speed."""
 
 
-Calibration = Calibrate | CalibrateLens | CalibrateMount
+Calibration = Calibrate | CalibrateLens | CalibrateMount | CalibrateZoom
 Motor = GotoPlace | LookAt | MoveBy | ScanFor | Calibration
 Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Broadcast | Restart | TakeLens  # all but its motors
 Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Itself
@@ -272,6 +272,7 @@ READERS: dict[str, Callable[[Any], Command]] = {
     "CalibratePtz": _calibrate,
     "CalibrateLens": CalibrateLens.read,
     "CalibrateMount": CalibrateMount.read,
+    "CalibrateZoom": CalibrateZoom.read,
     "SetCameraInfo": TakeLens.read,
 }
 KEYS = {name.lower(): (name, reader) for name, reader in READERS.items()}

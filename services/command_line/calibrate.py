@@ -23,6 +23,7 @@ from services import client, document
 from services.client import FINAL, Client
 from services.command_line import prints
 from services.command_line.prints import Book, Inner, Kind, Side, Squares, squares_of
+from services.command_line.zoom import zoom
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.payloads import Calibration, OrderResult
@@ -37,6 +38,9 @@ CONFIG = Path("config/apartment.yaml")
 MOTORS_S, TOUR_S, SLACK_S = 600.0, 1800.0, 120.0
 BAR, FULL, EMPTY = 30, "#", "."
 ASK = "May {} turn now? It looks for the markers all around, for some minutes, and returns to where it looked."
+
+
+app.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom)
 
 
 @app.command(epilog="Example: apartment calibrate ptz ip1 --yes-move")

@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 
+from services.camera.calibration.study import study
 from services.camera.plan import Plan, ask, attempt, wait
 from services.camera.requests import Picture, Snapshot
 from services.camera.video import pictures
@@ -15,6 +16,7 @@ from services.vision.board import Board, Seen, find
 from services.vision.calibrate_lens import Array
 from services.vision.detect import detect
 from services.vision.frames import Kind
+from services.vision.zoom import Magnification, measure
 
 TRIES, AGAIN_S = 3, 0.3  # of a picture: the camera sometimes closes without an answer
 THUMB_PX = 960  # width of what the report shows
@@ -71,6 +73,11 @@ def board_in(jpeg: bytes, how: How, board: Board) -> BoardShot:
     image = how.upright(jpeg)
     seen = find(pictures.grey(image), board)
     return BoardShot((image.shape[1], image.shape[0]), pictures.thumbnail(image, THUMB_PX), seen)
+
+
+def compared(wide: bytes, zoomed: bytes, how: How) -> Plan[tuple[Magnification, float]]:
+    """How much the second picture is magnified over the first, and the time then; Refused when it cannot be told."""
+    return study(lambda: measure(how.upright(wide), how.upright(zoomed)))
 
 
 def markers_in(

@@ -105,12 +105,12 @@ class Course:
         self.told[axis][:] = [one._replace(level=-one.level) for one in self.told[axis]]
         self.levels[axis] = -self.levels[axis]
 
-    def leave(self, zoom: float) -> None:
-        """The firmware drives on by itself: what was told is over, and where that led will be read."""
+    def leave(self, pose: Pose) -> None:
+        """The firmware drives on by itself: what was told is over, and where it leads will be read."""
         for told in self.told:
             told.clear()
         self.levels = [0, 0, 0]
-        self.origin = (self.origin[PAN], self.origin[TILT], zoom)
+        self.origin = pose
 
     def stand(self, pose: Pose) -> None:
         """Pan and tilt were read at rest: they start anew from there, and zoom too unless it turns."""

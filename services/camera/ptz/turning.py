@@ -9,8 +9,9 @@ from typing import cast
 
 from services.camera.plan import Plan, wait
 from services.camera.ptz import drive as own
-from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.course import PAN, TILT
 from services.camera.ptz.helm import Helm, levels_of, sign
+from services.camera.ptz.homing import Homing
 from services.camera.ptz.leg import DANGER, Leg, choose
 from services.camera.ptz.outlook import Way
 from services.camera.ptz.zooming import Zooming
@@ -37,6 +38,7 @@ class Turning:
 
     def __init__(self, helm: Helm, zooming: Zooming) -> None:
         self.helm, self.zooming = helm, zooming
+        self.homing = Homing(helm, self._watch)
 
     def turn(self, axes: list[int], now: float, *, zoom: bool) -> Plan[float]:
         """One leg of pan and tilt; it ends with a stop, or with zoom in its place. Returns when that was answered."""
@@ -46,8 +48,8 @@ class Turning:
         try:
             if unsure:
                 now = yield from self._probe(unsure)
-            elif axes == [PAN] and own.pan_only(self.helm.skill):
-                return (yield from self._home_pan(now))
+            elif own.pan_only(self.helm.skill) and (zoom or PAN in axes):
+                return (yield from (self.homing.tilt(now) if TILT in axes else self.homing.home(now)))
             return (yield from self._legs(axes, now, zoom=zoom))
         except Refused:
             if not self.helm.skill.diagonals or len(axes) < 2:
@@ -70,8 +72,6 @@ class Turning:
             if ahead:
                 axes = sorted({*ahead, *self._beside(now)})
                 continue
-            if own.pan_only(self.helm.skill) and (zoom or PAN in leg.parts):
-                return (yield from self._home_pan(now))
             now = yield from (self.zooming.begin() if zoom else self.helm.stop(now))
             zoom, axes = False, self._reckon(now)
             if not axes:
@@ -79,16 +79,6 @@ class Turning:
             if self.helm.zoom_ends is not None:
                 now = yield from wait(max(now, self.helm.zoom_ends))
         return (yield from self.helm.stop(now)) if any(self.helm.course.levels) else now
-
-    def _home_pan(self, now: float) -> Plan[float]:
-        """Firmware that takes a position but ignores its tilt ends a leg: pan and zoom become exact, tilt ends."""
-        helm = self.helm
-        here = tuple(helm.course.stopped(axis, now) for axis in range(3))
-        way = own.to_pan((here[0], here[1], here[2]), (helm.aim[PAN], here[TILT], helm.goal.pose[ZOOM]))
-        now = (yield from helm.send(way.request)).received
-        helm.course.leave(here[ZOOM])
-        helm.quiet = now + own.longest(helm.skill, (here[0], here[1], here[2]), way.to)
-        return now
 
     def _reckon(self, now: float) -> list[int]:
         """The axes that will rest beside the goal, where that is reckoned well enough to go on without a reading."""

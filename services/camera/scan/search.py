@@ -92,12 +92,13 @@ class Scan:
     def state(
         self, state: Literal["running", "done", "cancelled", "failed"], now: float, reason: str = ""
     ) -> ScanState:
-        """How far it is."""
+        """How far it is; while it runs, what was seen in one frame only is not found yet."""
+        found = [one for one in self.findings.seen if state != "running" or self.findings.found(one)]
         return ScanState(
             state=state,
             scan=self.name,
             targets=list(self.findings.targets),
-            found=sorted(self.findings.seen),
+            found=sorted(found),
             turn=self.turn,
             place=self.place,
             progress=1.0 if state == "done" else self._progress(),

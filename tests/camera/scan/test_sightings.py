@@ -125,7 +125,8 @@ def test_two_markers_of_one_id_that_are_seen_together_are_two_results() -> None:
 
 def test_the_mount_s_own_doubt_is_in_the_covariance() -> None:
     sightings = seen(ahead(HERE, metres=4.0))
-    exact, doubted = said(sightings)[0], said(sightings, replace(EYE, mount_doubt=(0.01, 0.1)))[0]
+    doubt = np.diag(np.square([0.01] * 3 + [np.radians(0.1)] * 3))
+    exact, doubted = said(sightings)[0], said(sightings, replace(EYE, mount_doubt=doubt))[0]
     grown = np.linalg.eigvalsh(np.array(doubted.covariance) - np.array(exact.covariance))
     assert grown[0] == pytest.approx(0.01**2, rel=0.01)  # along the arm: its place alone
     assert grown[2] == pytest.approx(0.01**2 + (4.03 * np.radians(0.1)) ** 2, rel=0.1)
