@@ -30,7 +30,7 @@ from services.bus.mqtt import MqttBus
 from services.peers import mosquitto
 from services.runner import Runner
 from tests.bridge import bench as bridge_bench
-from tests.camera import goal_figures
+from tests.camera import goal_figures, scan_figures
 from tests.persistence import figures as writer_figures
 
 MESSAGES = 20_000
@@ -181,9 +181,14 @@ def main() -> None:
     Console(width=None if sys.stdout.isatty() else 170).print(goals_table(moves))
     bridged = list(bridge_bench.rows())
     Console(width=None if sys.stdout.isatty() else 170).print(bridge_bench.table(bridged))
+    scans = scan_figures.rows()
+    Console(width=None if sys.stdout.isatty() else 170).print(scan_figures.table(scans))
     figured = [{**asdict(figure), "ratio": figure.ratio} for figure in figures]
     given.json.write_text(
-        json.dumps([*figured, *map(asdict, stored), *map(asdict, moves), *map(asdict, bridged)], indent=1)
+        json.dumps(
+            [*figured, *map(asdict, stored), *map(asdict, moves), *map(asdict, bridged), *scan_figures.plain(scans)],
+            indent=1,
+        )
     )
 
 

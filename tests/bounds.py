@@ -9,6 +9,9 @@ MEDIAN_POSITIONS = 1.3  # where it honours an absolute position
 COMMANDS = 12  # for a goal, answers to login challenges not counted
 WITHIN_COMMANDS = 0.9  # of the goals at least; a first goal, or one with a late answer or two, takes more
 
+SCAN_OVER_LEAST = 1.3  # a full scan (both picture modes, K = 8) over the least time of motors, frames and one switch
+SCAN_QUICKER = 3.5  # than the report's scan of the same places
+SIGHTING_SHARE = 0.25  # of the report's time until a target at a random place was seen
 # Where a marker of 0.14 m is, 2 to 6 m away, from eight frames of one place: median and 95 in 100, mm.
 EXACT_MM = (10.0, 30.0)  # with exact readings
 NOISY_MM = (15.0, 45.0)  # with readings that are off by READ_NOISE_DEG (one standard deviation)
@@ -17,3 +20,5 @@ MAGNIFICATION = 0.002  # share, median
 FLIPPED = 0.02  # of the orientations that are said to be certain
 INSIDE, INSIDE_BY = 0.90, 0.05  # of the errors in the 90 % ellipsoid
 CALIBRATED_FOCAL = 0.005  # share by which a calibrated level's focal length is off at most
+LENS = 0.005  # share by which a calibrated lens's focal lengths are off at most
+MOUNT_M, MOUNT_DEG = 0.010, 0.3  # a calibrated mount, median, from five markers that were put a centimetre beside

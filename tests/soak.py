@@ -12,7 +12,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,10 @@ from services.virtual import VirtualApartment
 from tests import trials
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
+from tests.camera.scan.scenes import scan_a_scene
 from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
-from tests.vision import positions
+from tests.vision import mount_trials, positions
 
 LONGEST_S = 600.0
 HANGING = ("a", "b", "c", "d")
@@ -143,6 +144,8 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "broker-kills-backlog": (lambda: writer(lambda one, rng: lost_by_the_broker(one, rng, backlog=True)), 10, "% lost"),
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
+    "calibration": (mount_trials.calibrations, 150, "mm off, of the mount"),
+    "scenes": (lambda: nullcontext(lambda rng: scan_a_scene(rng)), 24, "s, virtual"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 

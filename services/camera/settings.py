@@ -127,6 +127,7 @@ class Config(Section):
     tilt_range: Pair = (-10.0, 108.0)
     zoom_range: Pair = (0.0, 8.0)
     mount: MountSettings | None = None
+    mount_doubt: Pair = (0.0, 0.0)  # m and degrees, each axis, one standard deviation: as a calibration tells them
     reading_noise_deg: float = Field(default=0.05, ge=0, le=2)  # of pan and tilt, one standard deviation
     routine: tuple[str, ...] | None = None  # places that a scan visits, in order; None: all, on the shortest way
     frames: int = Field(default=4, ge=1, le=50)  # at each place of a scan
@@ -139,6 +140,7 @@ class Config(Section):
     stream: StreamSettings = StreamSettings()
     snapshot: SnapshotSettings = SnapshotSettings()
     scan_pictures: Literal["stream", "snapshot"] = "stream"  # what a scan looks at, where the camera has a stream
+    hits: int = Field(default=100, ge=0, le=10000)  # pictures of what scans have seen that are kept; 0: none
     workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
 
     @model_validator(mode="before")

@@ -173,9 +173,10 @@ def _coarse(wide: Picture, zoomed: Picture, between: tuple[float, float]) -> Arr
     low = round(COARSE_PX * height / width)
     around = ((ROOM_PX, ROOM_PX), (ROOM_PX, ROOM_PX))
     small = np.pad(_evened(_resized(wide, COARSE_PX, low)), around, constant_values=128)
+    medium = _resized(zoomed, 2 * COARSE_PX, 2 * low)  # shrinking the large one again and again is what takes time
     likest = (LIKE, 0.0, 0, 0)
     for times in between[0] * STEP ** np.arange(ceil(log(between[1] / between[0]) / log(STEP)) + 1):
-        part = _evened(_resized(zoomed, round(COARSE_PX / times), round(low / times)))
+        part = _evened(_resized(medium, round(COARSE_PX / times), round(low / times)))
         _, like, _, (x, y) = cv2.minMaxLoc(cv2.matchTemplate(small, part, cv2.TM_CCOEFF_NORMED))
         likest = max(likest, (like, COARSE_PX / part.shape[1], x - ROOM_PX, y - ROOM_PX))
     _, times, x, y = likest

@@ -25,6 +25,7 @@ BESIDE_DEG = 6.0  # farther from what was asked for, it was not honoured
 PLANE_DEG = 12.0  # the picture's plane is flat enough for so much
 PLANE_TAN = (1.0, 0.56)  # of the whole scale at the widest zoom, a guess to begin with
 LEAST_DEG = 0.3
+ZOOM_LATE_S = 0.06  # it may still slow down when its coarse reading is the last one
 NOISE_DEG, NOISE_S = 0.2, 0.03  # of a reading on the way
 WITHIN_DEG = 0.1  # what is asked for stays so far from an end stop
 
@@ -110,7 +111,8 @@ def seconds(pace: Pace, distance: float) -> float:
 
 def longest(skill: Skill, here: Pose, there: Pose) -> float:
     """How long the firmware needs for all axes."""
-    return max(seconds(pace, abs(b - a)) for pace, a, b in zip(skill.drives, here, there, strict=True))
+    pan, tilt, zoom = (seconds(pace, abs(b - a)) for pace, a, b in zip(skill.drives, here, there, strict=True))
+    return max(pan, tilt, zoom + ZOOM_LATE_S if zoom else 0.0)
 
 
 def learn_on_the_way(skill: Skill, here: Pose, drive: Drive, begun: Reply, reply: Reply, seen: Pose) -> None:

@@ -1,6 +1,8 @@
 """Looking for markers in frames, in processes of its own during a scan, so that motors never wait for pixels.
 
-Results go to the inbox as `/camera/analysed`. `Inline` does the same at once, for virtual time and tests.
+The frames of one place are looked at together, when all have come: one search in their mean instead of one in each.
+Results go to the inbox as `/camera/analysed`, one for each frame. `Inline` does the same with every frame at once and
+by itself, for virtual time and tests. The scan itself is `search.py`.
 """
 
 from __future__ import annotations
@@ -9,7 +11,8 @@ import logging
 import multiprocessing
 import os
 import threading
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -17,16 +20,23 @@ from services.bus import Message
 from services.camera.requests import Away
 from services.camera.video import pictures
 from services.runner import Post
-from services.vision.detect import Detection, detect
+from services.vision.detect import Detection
+from services.vision.still import Picture, Still, detect_still
 
 ANALYSED = "/camera/analysed"
+GATHER_S = 1.0  # after the newest frame of a place: one that was lost must not hold up the others
+DECODERS = 2  # threads of a worker that decode: there are frames for both, and decoding is a third of the work
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Task:
-    """One frame, and what to look for in it. `flip`, `mirror`: as it was delivered. `draw`: send the picture back."""
+    """One frame, and what to look for in it. `flip`, `mirror`: as it was delivered.
+
+    `draw`: send the picture back; of the frames of a place the first with a marker in it is sent back in any case.
+    `of` frames with this `still` come in all, taken by a camera that stood still in between; 1: this one alone.
+    """
 
     scan: str
     number: int
@@ -37,6 +47,8 @@ class Task:
     dictionary: str
     targets: tuple[int, ...]
     draw: bool = False
+    still: int = 0
+    of: int = 1
 
 
 @dataclass(frozen=True)
@@ -63,15 +75,53 @@ class Analyst(Protocol):
         ...
 
 
-def analyse(task: Task) -> Analysed:
-    """Decodes, sets upright, finds the markers, draws them when asked."""
+def analyse(tasks: Sequence[Task]) -> list[Analysed]:
+    """The frames of one place (at least one): decoded, set upright, searched together, drawn on when asked."""
+    with ThreadPoolExecutor(min(DECODERS, len(tasks))) as decoders:
+        decoded = list(decoders.map(_decoded, tasks))
+    frames = {task.number: image for task, image in zip(tasks, decoded, strict=True) if not isinstance(image, Away)}
+    seen: dict[int, list[Detection]] = {number: [] for number in frames}
+    for size in {image.shape for image in frames.values()}:
+        numbers = [number for number, image in frames.items() if image.shape == size]
+        for one in detect_still([frames[number] for number in numbers], tasks[0].dictionary, tasks[0].targets):
+            for number, detection in _in_each(one, numbers):
+                seen[number].append(detection)
+    shown = next((number for number in seen if seen[number]), None)
+    return [
+        _analysed(task, image, seen.get(task.number, []), draw=task.draw or task.number == shown)
+        for task, image in zip(tasks, decoded, strict=True)
+    ]
+
+
+def _decoded(task: Task) -> Picture | Away:
+    """The frame in grey, upright; or why there is none."""
     try:
-        image = pictures.upright(pictures.decode(task.jpeg), flip=task.flip, mirror=task.mirror, kind=task.kind)
+        grey = pictures.decode_grey(task.jpeg)
     except Away as error:
-        return Analysed(task.scan, task.number, error=str(error))
-    found = tuple(detect(image, task.dictionary, task.targets))
-    jpeg = pictures.encode(pictures.drawn(image, [(one.marker, one.corners) for one in found])) if task.draw else None
-    return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), found, jpeg)
+        return error
+    return pictures.upright(grey, flip=task.flip, mirror=task.mirror, kind=task.kind)
+
+
+def _in_each(one: Still, numbers: Sequence[int]) -> list[tuple[int, Detection]]:
+    """The marker as it is in each of the frames that agree."""
+    found = one.detection
+    if len(numbers) == 1:
+        return [(numbers[0], found)]
+    agreeing = zip(one.frames, one.corners, strict=True)
+    return [(numbers[index], Detection(found.marker, corners, found.confidence)) for index, corners in agreeing]
+
+
+def _analysed(task: Task, image: Picture | Away, found: Sequence[Detection], *, draw: bool) -> Analysed:
+    if isinstance(image, Away):
+        return Analysed(task.scan, task.number, error=str(image))
+    jpeg = _drawn(task, found) if draw else None
+    return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), tuple(found), jpeg)
+
+
+def _drawn(task: Task, found: Sequence[Detection]) -> bytes:
+    """The frame in its colours, with what was found in it."""
+    image = pictures.upright(pictures.decode(task.jpeg), flip=task.flip, mirror=task.mirror, kind=task.kind)
+    return pictures.encode(pictures.drawn(image, [(one.marker, one.corners) for one in found]))
 
 
 def _begin_work() -> None:
@@ -95,7 +145,8 @@ class Inline:
 
     def submit(self, task: Task) -> None:
         """Works here and now."""
-        self.post(Message(ANALYSED, value=analyse(task)))
+        for analysed in analyse([task]):
+            self.post(Message(ANALYSED, value=analysed))
 
     def close(self) -> None:
         """Nothing to forget."""
@@ -109,25 +160,72 @@ class Pool:
         self.pool = ProcessPoolExecutor(
             workers, mp_context=multiprocessing.get_context("spawn"), initializer=_begin_work
         )
+        self._gathered: dict[tuple[str, int], _Gathered] = {}
+        self._lock = threading.Lock()
 
     def submit(self, task: Task) -> None:
-        """Lets a worker do it; one that died fails the frame, not the service."""
-        try:
-            future = self.pool.submit(analyse, task)
-        except RuntimeError as error:  # a broken pool is a RuntimeError too
-            self.post(Message(ANALYSED, value=Analysed(task.scan, task.number, error=f"no worker: {error}")))
+        """Lets a worker look when all frames of the place are there, or no more come."""
+        if task.of <= 1:
+            self._work([task])
             return
-        future.add_done_callback(lambda done: self._done(task, done))
+        place = (task.scan, task.still)
+        with self._lock:
+            before = self._gathered.get(place)
+            if before is not None:
+                before.timer.cancel()
+            timer = threading.Timer(GATHER_S, self._late, (place,))
+            timer.daemon = True
+            timer.start()
+            tasks = [*(before.tasks if before else ()), task]
+            self._gathered[place] = _Gathered(timer, tasks)
+            whole = len(tasks) >= task.of
+        if whole:
+            self._late(place)
 
     def close(self) -> None:
         """Ends the processes."""
+        with self._lock:
+            for waiting in self._gathered.values():
+                waiting.timer.cancel()
+            self._gathered.clear()
         self.pool.shutdown(wait=False, cancel_futures=True)
 
-    def _done(self, task: Task, done: Future[Analysed]) -> None:
+    def _late(self, place: tuple[str, int]) -> None:
+        """What has come of a place is looked at."""
+        with self._lock:
+            waiting = self._gathered.pop(place, None)
+        if waiting is not None:
+            waiting.timer.cancel()
+            self._work(waiting.tasks)
+
+    def _work(self, tasks: list[Task]) -> None:
+        """One that died fails the frames, not the service."""
+        try:
+            future = self.pool.submit(analyse, tasks)
+        except RuntimeError as error:  # a broken pool is a RuntimeError too
+            self._failed(tasks, f"no worker: {error}")
+            return
+        future.add_done_callback(lambda done: self._done(tasks, done))
+
+    def _done(self, tasks: list[Task], done: Future[list[Analysed]]) -> None:
         if done.cancelled():
             return
         error = done.exception()
         if error is not None:
-            log.error("a frame could not be analysed: %r", error)
-        value = done.result() if error is None else Analysed(task.scan, task.number, error=repr(error))
-        self.post(Message(ANALYSED, value=value))
+            log.error("frames could not be analysed: %r", error)
+            self._failed(tasks, repr(error))
+            return
+        for analysed in done.result():
+            self.post(Message(ANALYSED, value=analysed))
+
+    def _failed(self, tasks: list[Task], error: str) -> None:
+        for task in tasks:
+            self.post(Message(ANALYSED, value=Analysed(task.scan, task.number, error=error)))
+
+
+@dataclass
+class _Gathered:
+    """The frames of a place as far as they have come, and when no more are waited for."""
+
+    timer: threading.Timer
+    tasks: list[Task]
