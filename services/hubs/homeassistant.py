@@ -17,6 +17,8 @@ from services.states import base_type
 Fields = dict[str, Any]
 KNOWN = "value not in ('NULL', 'UNDEF')"
 PLAIN = f"{{{{ value if {KNOWN} else 'None' }}}}"
+WORDS = f"{{{{ value if {KNOWN} else 'unknown' }}}}"  # of a sensor that is no number, `None` would be a word too
+EMPTY = f"{{{{ value if {KNOWN} else '' }}}}"
 NUMBER = f"{{{{ value.split(' ')[0] if {KNOWN} else 'None' }}}}"
 LIT = "{{ 'ON' if value == 'ON' or value.split(',')[-1] | float(0) > 0 else 'OFF' }}"
 BRIGHTNESS = "{{ value.split(',')[-1] | float(0) | round | int }}"
@@ -76,7 +78,7 @@ def _entity(item: Item) -> tuple[str, Fields]:
 
 def _measured(item: Item) -> Fields:
     if base_type(item.type) != "Number":
-        return {"value_template": PLAIN}
+        return {"value_template": WORDS}
     dimension = item.type.partition(":")[2]
     found: Fields = {"value_template": NUMBER, "state_class": "measurement"}
     if item.unit:
@@ -133,7 +135,7 @@ def _number(item: Item) -> tuple[str, Fields]:
 
 def _text(item: Item) -> tuple[str, Fields]:
     if not item.options:
-        return "text", {"value_template": PLAIN}
+        return "text", {"value_template": EMPTY}
     words = {state: shown or state for state, shown in item.options.items()}
     if len(set(words.values())) < len(words):
         words = {state: state for state in words}
@@ -145,7 +147,7 @@ def _text(item: Item) -> tuple[str, Fields]:
 
 
 def _looked_up(words: Mapping[str, str]) -> str:
-    return f"{{{{ {json.dumps(words)}.get(value, value) }}}}"
+    return f"{{{{ {json.dumps(words)}.get(value, 'None') }}}}"
 
 
 def _player(_: Item) -> tuple[str, Fields]:

@@ -66,7 +66,7 @@ def test_every_member_of_ros_has_one_entity_but_what_none_can_show() -> None:
 @pytest.mark.parametrize(
     ("item", "state", "shown"),
     [("Lab_Temp", "21.5 °C", "21.5"), ("Lab_Temp", "UNDEF", "None"), ("Bedroom_Mode", "eco", "Cooler"),
-     ("Bedroom_Mode", "NULL", "NULL"), ("Front_Door_LastOpened", "NULL", "None"), ("Radio_Volume", "30", "30")],
+     ("Bedroom_Mode", "NULL", "None"), ("Front_Door_LastOpened", "NULL", "unknown"), ("Radio_Volume", "30", "30")],
 )  # fmt: skip
 def test_a_template_makes_of_a_state_what_is_shown(item: str, state: str, shown: str) -> None:
     content = next(content for (_, name), content in told().items() if name == item)
