@@ -17,7 +17,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, stored, topics
 from services.bus import Message
-from services.command_line import calibrate, mission, openhab
+from services.command_line import calibrate, mission, openhab, zoom
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -191,6 +191,7 @@ def probe(
 
 
 stored.add_to(app)
+calibrate.app.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom.zoom)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(mission.app, name="mission")
 app.add_typer(openhab.app, name="openhab")

@@ -19,9 +19,9 @@ from services.vision.lens import Lens
 Array = NDArray[np.float64]
 
 RANDOM_PX = 0.02  # corner noise per axis of one frame, new in each, where their own scatter does not tell
-FIXED_PX = 0.018  # and what all frames of a place share: the pixel grid, the lens calibration
+FIXED_PX = 0.016  # and what all frames of a place share: the pixel grid, the lens calibration
 FIXED_SIDES = 0.0003  # of the marker's side, shared too: paper and print
-FIXED_SHARE = 0.6  # of the random noise: what makes a picture worse does it to both; measured from .02/.026 to .07/.04
+FIXED_SHARE = 0.5  # of the random noise: what makes a picture worse does it to both; measured from .02/.026 to .07/.04
 KNOWN_FROM = 8.0  # numbers that RANDOM_PX counts as against the frames' own scatter
 SAME_PLACE_M, SAME_PLACE_DEG = 0.005, 0.2  # readings that differ by less are one place, read with a jitter
 SAME_FOCAL = 1e-3  # share; a zoom measured anew in each frame is the same zoom
@@ -36,7 +36,8 @@ class View:
 
     `size_m` is the side of the printed black square, `angle_noise_deg` how well the readings are known of pan and tilt,
     which turn about `axes` (2, 3) in the apartment; None: about any. `focal_doubt` is the standard deviation of the
-    lens's focal length as a share of it. A picture that was `enlarged` has coarser corners by that factor.
+    lens's focal length as a share of it, `aside_deg` that of its axis in any direction. A picture that was `enlarged`
+    has coarser corners by that factor.
     """
 
     lens: Lens
@@ -45,6 +46,7 @@ class View:
     size_m: float
     angle_noise_deg: float = 0.05
     focal_doubt: float = 0.0
+    aside_deg: float = 0.0
     enlarged: float = 1.0
     axes: Array | None = None
     at: float = 0.0
@@ -101,10 +103,11 @@ def gather(places: Sequence[Sequence[View]]) -> Sights:
 
 
 def _swing(view: View, rotation: Array) -> Array:
-    noise = np.radians(view.angle_noise_deg)
-    if view.axes is None:
-        return np.asarray(noise * np.eye(3), float)
-    return np.column_stack((noise * rotation.T @ view.axes.T, np.zeros(3)))
+    """Turns of the camera by which it may look beside its reading: a square root of their covariance."""
+    axes = rotation.T if view.axes is None else rotation.T @ view.axes.T
+    covariance = np.radians(view.angle_noise_deg) ** 2 * axes @ axes.T + np.radians(view.aside_deg) ** 2 * np.eye(3)
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)), float)
 
 
 def average(corners: Array, enlarged: float = 1.0) -> tuple[Array, float]:

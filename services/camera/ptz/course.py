@@ -106,7 +106,7 @@ class Course:
         self.levels[axis] = -self.levels[axis]
 
     def leave(self, pose: Pose) -> None:
-        """The firmware drives on by itself: what was told is over; about the pose that it left, where it led is read."""
+        """The firmware drives on by itself: what was told is over, and where it leads will be read."""
         for told in self.told:
             told.clear()
         self.levels = [0, 0, 0]

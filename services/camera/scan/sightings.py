@@ -156,14 +156,15 @@ def _hung(located: Located, mount: Mount, doubt: Array | None) -> Located:
 
 
 def _view(eye: Eye, lens: Lens, mount: Mount, sought: Sought, sighting: Sighting, magnified: Magnification) -> View:
-    reading = sighting.reading
+    reading, zoomed = sighting.reading, magnified.through(lens.scaled(*sighting.size))
     return View(
-        lens=magnified.through(lens.scaled(*sighting.size)),
+        lens=zoomed,
         camera=camera_in_apartment(mount, reading.pan, reading.tilt),
         corners=np.asarray(sighting.detection.corners, float),
         size_m=sought.size_m,
         angle_noise_deg=eye.angle_noise_deg,
         focal_doubt=magnified.relative,
+        aside_deg=degrees(magnified.aside * zoomed.width / zoomed.focal),
         enlarged=max(1.0, magnified.times),
         axes=axes_in_apartment(mount, reading.pan, reading.tilt),
         at=sighting.at,
