@@ -15,7 +15,7 @@ demo: $(VENV)/demo.stamp
 	@$(APARTMENT) demo $(ARGS)
 
 test: $(VENV)/dev.stamp system-packages
-	$(VENV)/bin/python -m pytest $(ARGS)
+	$(VENV)/bin/python -m pytest $(or $(ARGS),-n 2 --dist loadfile)
 
 soak: $(VENV)/dev.stamp
 	@$(VENV)/bin/python -m tests.soak --part $(PART) --turns $(N) --seed $(SEED)

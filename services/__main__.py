@@ -17,7 +17,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, stored, topics
 from services.bus import Message
-from services.command_line import mission, openhab
+from services.command_line import calibrate, mission, openhab, zoom
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -31,7 +31,6 @@ app = typer.Typer(
 Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
 Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
 CONFIG = Path("config/apartment.yaml")
-CALIBRATION_S = 600.0
 STATUS_S = 1.0  # how long retained states may take to come
 out = Console(soft_wrap=True, highlight=False)
 err = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -133,18 +132,35 @@ def order(
 def scan(
     camera: str,
     target: Annotated[list[int], typer.Option(help="A marker; repeat for more.")],
+    full: Annotated[bool, typer.Option("--full", help="Every place, in both picture modes.")] = False,
+    plot: Annotated[Path | None, typer.Option(help="Draw a plan with what was found into this PNG file.")] = None,
+    world: Annotated[Path | None, typer.Option(help="The file with the rooms; default: the simulated one.")] = None,
     config: Config = CONFIG,
     json: Json = False,
 ) -> None:
     """Look for markers with a camera; exit 1 when one was not found."""
-    filters = (topics.CAMERA_ORDER_RESULT.filter, topics.CAMERA_SCAN_RESULT.filter)
-    with client.connected(load(config).bus, filters) as bus:
-        result = bus.order(camera, "Scan", {"targets": target}, timeout_s=600.0, tell=None if json else _tell_order)
-        found = {message.topic: message for message in bus.seen if message.topic.endswith("/scan/result")}
+    from services import scanned  # it brings OpenCV
+
+    apartment = load(config)
+    if camera not in apartment.cameras:
+        raise typer.BadParameter(f"expected one of {', '.join(apartment.cameras) or 'none'}, got {camera!r}")
+    filters = [row.filter_for(cam=camera) for row in (topics.CAMERA_ORDER_RESULT, *scanned.HEARD)]
+    with client.connected(apartment.bus, filters) as bus:
+        wish = {"targets": target, "full": full}
+        result = bus.order(camera, "Scan", wish, timeout_s=600.0, tell=None if json else _tell_order)
+        heard = [message for message in bus.seen if not message.topic.endswith("/order_result")]
+    found = {read.payload.marker: read.message for read in _scan_results(heard)}
     for message in found.values():
         out.print_json(message.payload.decode()) if json else out.print(topics.read(message, message.received).payload)
+    if plot is not None:
+        scanned.plot(apartment, camera, heard, plot, world)
     if result.state != "done" or not found:
         raise typer.Exit(1)
+
+
+def _scan_results(heard: list[Message]) -> list[topics.Read]:
+    reads = (topics.read(message, message.received) for message in heard)
+    return [one for one in reads if one.topic is topics.CAMERA_SCAN_RESULT]
 
 
 @app.command(epilog="Example: apartment probe ip1 --url http://192.0.2.9 --user ros")
@@ -175,30 +191,10 @@ def probe(
 
 
 stored.add_to(app)
+calibrate.app.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom.zoom)
+app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(mission.app, name="mission")
 app.add_typer(openhab.app, name="openhab")
-calibrate = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
-app.add_typer(calibrate, name="calibrate")
-
-
-@calibrate.command(epilog="Example: apartment calibrate ptz ip1 --yes-move")
-def ptz(
-    camera: str,
-    yes_move: Annotated[bool, typer.Option("--yes-move", help="It may move; else the terminal is asked.")] = False,
-    config: Config = CONFIG,
-) -> None:
-    """Turn a camera with every speed and keep what that teaches: speeds, delays, accelerations, smallest step."""
-    from services.camera.ptz import command  # for this command alone
-
-    apartment = load(config, (f"camera-{camera}",))
-
-    def ordered() -> bool:
-        with client.connected(apartment.bus, (topics.CAMERA_ORDER_RESULT.filter,)) as bus:
-            result = bus.order(camera, "CalibratePtz", "True", timeout_s=CALIBRATION_S, tell=_tell_order)
-        return result.state == "done"
-
-    if not command.run(out, camera, apartment.state, ordered, yes_move=yes_move):
-        raise typer.Exit(1)
 
 
 def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:

@@ -47,7 +47,8 @@ def _rights(account: str, cameras: list[str]) -> list[str]:
         if writes or reads or "<service>" in topic.writers:
             _add(rows, account, topic, writes=writes, reads=reads)
     reply = f"topic {'readwrite' if account == 'operator' else 'write'} reply/#"
-    return [*(f"topic {right} {topic_filter}" for topic_filter, right in rows.items()), reply]
+    own = ["topic read $SYS/broker/#"] if account == "persistence" else []  # whether the broker dropped something
+    return [*own, *(f"topic {right} {topic_filter}" for topic_filter, right in rows.items()), reply]
 
 
 def _add(rows: dict[str, str], account: str, topic: Topic, *, writes: bool, reads: bool) -> None:

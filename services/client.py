@@ -81,6 +81,12 @@ class Client:
         self.pump()
         self.seen.clear()
 
+    def give(self, camera: str, key: str, value: Any = "") -> str:
+        """Gives a camera an order; the id that its answers carry."""
+        name = uuid.uuid4().hex[:12]
+        self.publish(CAMERA_ORDER.message(Order(value=value, id=name), cam=camera, key=key))
+        return name
+
     def order(
         self,
         camera: str,
@@ -90,11 +96,10 @@ class Client:
         tell: Callable[[OrderResult], None] | None = None,
     ) -> OrderResult:
         """Gives a camera an order and waits for the answer that ends it; TimeoutError when none comes."""
-        order = Order(value=value, id=uuid.uuid4().hex[:12])
-        self.publish(CAMERA_ORDER.message(order, cam=camera, key=key))
+        given = self.give(camera, key, value)
 
         def ours(result: OrderResult) -> bool:
-            if result.id != order.id:
+            if result.id != given:
                 return False
             if tell is not None:
                 tell(result)

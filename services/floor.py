@@ -7,17 +7,19 @@ Not here: where a robot may stand to see something (`mission/standing.py`), and 
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any, Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, ValidationError
 
 from services import document
-from services.errors import ConfigError
+from services.section import Section
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1  # as in nav_msgs/OccupancyGrid
 PIXELS = {FREE: 254, OCCUPIED: 0, UNKNOWN: 205}  # as map_saver writes them
@@ -28,11 +30,15 @@ Cells = NDArray[np.int8]
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """`cells` (rows, columns) of int8, row 0 at the lowest y; `resolution` metres per cell; `origin` x, y in metres."""
+    """`cells` (rows, columns) of int8, row 0 at the lowest y; `resolution` metres per cell; `origin` x, y in metres.
+
+    `yaw` of the whole, radians. Only a grid that is not turned has points, ways and sights.
+    """
 
     cells: Cells
     resolution: float
     origin: XY
+    yaw: float = 0.0
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
         """Row and column of the cell that holds a point; it may lie outside."""
@@ -114,44 +120,49 @@ def _edge(cells: NDArray[np.int_]) -> NDArray[np.float64]:
     return np.maximum(np.abs(cells) - 0.5, 0.0)
 
 
+class MapFile(Section):
+    """What stands in map_server's YAML (wiki.ros.org/map_server)."""
+
+    image: Path
+    resolution: float = Field(gt=0)  # m per pixel
+    origin: tuple[float, float, float]  # x, y in m, yaw in radians, of the lower left pixel
+    occupied_thresh: float = Field(default=0.65, ge=0, le=1)
+    free_thresh: float = Field(default=0.196, ge=0, le=1)
+    negate: int = Field(default=0, ge=0, le=1)
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+
+
 def read(file: Path) -> Grid:
-    """A map_server YAML and the PGM picture beside it (`image`, `resolution`, `origin`, `occupied_thresh`,
-    `free_thresh`, `negate`); ConfigError tells file and line."""
+    """A map_server YAML and the picture that it names; ConfigError tells file and line."""
     source = document.read(file)
-    if not source.faults and not isinstance(source.value, dict):
-        source.fault((), "expected a map as map_server writes it, got something else")
-    if source.faults:
-        raise ConfigError(source.faults)
+    document.must(source)
     try:
-        return _grid(file, source.value)
-    except (KeyError, TypeError, ValueError, OSError) as error:
-        text = f"no {error} in it" if isinstance(error, KeyError) else str(error)
-        raise ConfigError([f"{file}:1: expected a map as map_server writes it: {text}"]) from error
+        settings = MapFile.model_validate(source.value)
+    except ValidationError as error:
+        for fault in error.errors(include_url=False):
+            source.fault(fault["loc"], f"expected {fault['msg']}, got {str(fault['input'])[:80]!r}")
+        document.must(source)
+        raise
+    picture = cv2.imread(str(file.parent / settings.image), cv2.IMREAD_GRAYSCALE)
+    if picture is None:
+        source.fault(("image",), f"expected a picture, got {str(settings.image)!r}")
+        document.must(source)
+    x, y, yaw = settings.origin
+    return Grid(_cells(settings, np.asarray(picture)), settings.resolution, (x, y), yaw)
 
 
-def _grid(file: Path, settings: dict[str, object]) -> Grid:
-    x, y, yaw = (float(value) for value in settings["origin"])  # type: ignore[attr-defined]
-    if yaw:
-        raise ValueError("a map that is turned (origin's third number) is not supported")
-    grey = _pgm(file.parent / str(settings["image"])).astype(float)
-    dark = grey / 255 if settings.get("negate") else 1 - grey / 255
-    cells = np.full(grey.shape, UNKNOWN, np.int8)
-    cells[dark > float(str(settings.get("occupied_thresh", 0.65)))] = OCCUPIED
-    cells[dark < float(str(settings.get("free_thresh", 0.196)))] = FREE
-    return Grid(np.ascontiguousarray(cells[::-1]), float(str(settings["resolution"])), (x, y))
-
-
-def _pgm(file: Path) -> NDArray[np.uint8]:
-    """A binary grey PGM (P5, one byte per pixel), rows from the top."""
-    data = file.read_bytes()
-    head = re.match(rb"P5\s+(?:#[^\n]*\n\s*)*(\d+)\s+(\d+)\s+255\s", data)
-    if head is None:
-        raise ValueError(f"{file.name}: expected a binary PGM (P5) of 8 bits")
-    width, height = int(head[1]), int(head[2])
-    pixels = np.frombuffer(data, np.uint8, offset=head.end())
-    if len(pixels) < width * height:
-        raise ValueError(f"{file.name}: expected {width} x {height} pixels, got {len(pixels)}")
-    return pixels[: width * height].reshape(height, width)
+def _cells(settings: MapFile, picture: NDArray[Any]) -> Cells:
+    """The grid's values, bottom row first: 0 free, 100 occupied, -1 unknown, in between with `scale`."""
+    flipped = np.flipud(picture).astype(float)
+    if settings.mode == "raw":
+        return np.where(flipped > OCCUPIED, UNKNOWN, flipped).astype(np.int8)
+    occupied = flipped / 255 if settings.negate else (255 - flipped) / 255
+    if settings.mode == "scale":
+        between = 1 + 98 * (occupied - settings.free_thresh) / (settings.occupied_thresh - settings.free_thresh)
+    else:
+        between = np.full(occupied.shape, float(UNKNOWN))
+    grid = np.where(occupied > settings.occupied_thresh, OCCUPIED, between)
+    return np.where(occupied < settings.free_thresh, FREE, grid).astype(np.int8)
 
 
 def write(grid: Grid, file: Path) -> None:

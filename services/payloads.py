@@ -231,11 +231,12 @@ class ScanResult(Payload):
 class Calibration(Payload):
     """`camera/<cam>/calibration`: how far it is, what to show next, and at its end what came out.
 
-    `regions`: whether the board was shown there, rows from the top. `values`: each number with its standard deviation;
-    of a mount also `mount`, as the configuration writes it. `report` is a page with pictures, where the service runs.
+    `regions`: whether the board was shown there, rows from the top. `values`: each number with its standard deviation,
+    of a zoom the focal length of each level in pixels; of a mount also `mount`, as the configuration writes it.
+    `report` is a page with pictures, where the service runs.
     """
 
-    what: Literal["lens", "mount"]
+    what: Literal["lens", "mount", "zoom"]
     state: Literal["running", "done", "failed", "cancelled"]
     progress: float = Field(default=0.0, ge=0.0, le=1.0)
     views: int = 0

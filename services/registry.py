@@ -74,5 +74,7 @@ REGISTRY: tuple[Row, ...] = (
     Row("history", "services.history", ("history",), "answers what was, and clears what is old"),
     Row("camera-<cam>", "services.camera", ("cameras", "<cam>"), "drives one camera: places, orders, scans"),
     Row("bridge", "services.bridge", ("bridge",), "maps the bus to ROS 1 topics and back", group="light"),
+    Row("openhab", "services.openhab", ("openhab",), "mirrors an OpenHAB that has no MQTT binding", group="light"),
+    Row("hubs", "services.hubs", ("hubs",), "tells Home Assistant and Homie what there is", group="light"),
     Row("mission", "services.mission", ("mission",), "robot and house find a marker together", group="light"),
 )

@@ -67,4 +67,8 @@ def read(file: Path) -> tuple[RobotPlaces, Grid | None]:
                 source.fault(error["loc"], f"expected {error['msg']}, got {error['input']!r:.80}")
     if places is None or source.faults:
         raise ConfigError(source.faults)
-    return places, floor.read(file.parent / places.map) if places.map else None
+    grid = floor.read(file.parent / places.map) if places.map else None
+    if grid is not None and grid.yaw:
+        source.fault(("map",), "expected a map that is not turned (the third number of its origin 0)")
+        raise ConfigError(source.faults)
+    return places, grid

@@ -37,6 +37,10 @@ LEVELS = {
     "id": r"[A-Za-z0-9_-]{1,64}",
     "platform": r"[a-z_]+",
     "entity": r"[a-z0-9_-]+",
+    "device": r"[a-z0-9][a-z0-9-]*",  # of Homie, as are the next three
+    "node": r"[a-z0-9][a-z0-9-]*",
+    "property": r"[a-z0-9][a-z0-9-]*",
+    "attribute": r"\$[a-z]+",
     "component": r"[A-Za-z0-9_-]+(?:/[A-Za-z0-9_-]+)*",
 }
 

@@ -30,10 +30,12 @@ from services.bus.mqtt import MqttBus
 from services.peers import mosquitto
 from services.runner import Runner
 from tests.bridge import bench as bridge_bench
-from tests.camera import goal_figures
+from tests.camera import goal_figures, scan_figures
+from tests.persistence import figures as writer_figures
 from tests.vision import bench as vision_bench
 
 MESSAGES = 20_000
+STORED = 200_000  # messages of a backlog, and live, for the writer
 WINDOW = 500  # of the publisher
 RUNS = 5
 TOPIC = "home/Kitchen_Light/state"
@@ -169,21 +171,35 @@ def main() -> None:
     given = arguments.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         figures = bus_and_runner(Path(folder), given.runs)
+        stored = writer_figures.rows(Path(folder) / "writer", given.runs, STORED)
     table = Table("figure", "value", "floor", "ratio", "wanted", "the floor is")
     for figure in figures:
         table.add_row(figure.name, f"{figure.value:,.0f} {figure.unit}", f"{figure.floor:,.0f} {figure.unit}",
                       f"{figure.ratio:.2f}", f">= {figure.wanted}", figure.floor_is)  # fmt: skip
     Console(width=None if sys.stdout.isatty() else 170).print(table)
+    Console(width=None if sys.stdout.isatty() else 170).print(writer_table(stored))
     moves = goal_figures.rows()
     Console(width=None if sys.stdout.isatty() else 170).print(goals_table(moves))
     bridged = list(bridge_bench.rows())
     Console(width=None if sys.stdout.isatty() else 170).print(bridge_bench.table(bridged))
+    scans = scan_figures.rows()
+    Console(width=None if sys.stdout.isatty() else 170).print(scan_figures.table(scans))
     seen = list(vision_bench.rows())
     Console(width=None if sys.stdout.isatty() else 170).print(vision_bench.table(seen))
     figured = [{**asdict(figure), "ratio": figure.ratio} for figure in figures]
-    given.json.write_text(
-        json.dumps([*figured, *map(asdict, moves), *map(asdict, bridged), *map(asdict, seen)], indent=1)
+    figured += [*map(asdict, (*stored, *moves, *bridged, *seen)), *scan_figures.plain(scans)]
+    given.json.write_text(json.dumps(figured, indent=1))
+
+
+def writer_table(rows: list[writer_figures.Row]) -> Table:
+    """The writer's figures."""
+    table = Table(
+        "writer, QoS 1, a commit before each acknowledgement", "value", "floor", "ratio", "wanted", "the floor is"
     )
+    for row in rows:
+        floor, ratio = (f"{row.floor:,.0f}", f"{row.ratio:.2f}") if row.floor and row.ratio else ("", "")
+        table.add_row(row.name, f"{row.value:,.1f} {row.unit}", floor, ratio, row.wanted, row.floor_is)
+    return table
 
 
 def goals_table(moves: list[goal_figures.Row]) -> Table:

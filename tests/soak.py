@@ -12,7 +12,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,10 @@ from services.virtual import VirtualApartment
 from tests import trials
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
+from tests.camera.scan.scenes import scan_a_scene
 from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
-from tests.vision import positions
+from tests.vision import mount_trials, positions
 from tests.vision import trials as detector_trials
 
 LONGEST_S = 600.0
@@ -89,6 +90,7 @@ def bridge() -> Iterator[Turn]:
         yield traffic.turn
 
 
+@contextmanager
 def writer(trial: Callable[[writer_trials.Site, random.Random], float]) -> Iterator[Turn]:
     """Turns with the writer, its broker and its database alone."""
     with tempfile.TemporaryDirectory() as name, writer_trials.site(Path(name)) as one:
@@ -144,6 +146,8 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
     "detector": (detector_trials.in_numbers, 100, "false markers in 50 frames"),
+    "calibration": (mount_trials.calibrations, 150, "mm off, of the mount"),
+    "scenes": (lambda: nullcontext(lambda rng: scan_a_scene(rng)), 24, "s, virtual"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 

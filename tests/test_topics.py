@@ -32,7 +32,14 @@ ILLEGAL = {
     "platform": ["", "Sensor", "a-b", "a/b", "1"],
     "entity": ["", "Pan", "a b", "a/b", "é"],
     "component": ["", "/", "a/", "/a", "a//b", "a b", "é", "+"],
+    "device": ["", "Home", "-a", "a_b", "a/b", "$a", "+"],
+    "node": ["", "Lamp", "-a", "a_b", "a/b", "$a", "+"],
+    "property": ["", "Value", "-a", "a_b", "a/b", "$a", "+"],
+    "attribute": ["", "$", "name", "$Name", "$a/b", "+"],
 }
+
+
+SPECIAL = {"marker": "1", "attribute": "$name"}  # legal levels where `a` is none
 
 
 def legal(row: Topic) -> st.SearchStrategy[dict[str, str]]:
@@ -73,7 +80,7 @@ def test_an_illegal_level_is_refused_and_never_another_row(row: Topic, data: st.
 @given(st.text(PRINTABLE))
 def test_a_level_is_legal_exactly_when_its_row_reads_it_back(text: str) -> None:
     for row in TABLE:
-        levels = {name: "a1"[: 2 if name not in ("key", "marker") else 1] for name in row.names} | {"marker": "1"}
+        levels = {name: "a1"[: 2 if name not in ("key", "marker") else 1] for name in row.names} | SPECIAL
         for name in row.names:
             try:
                 topic = row.name(**(levels | {name: text}))
@@ -100,7 +107,7 @@ def test_what_only_looks_like_a_topic_is_refused(topic: str) -> None:
 
 @pytest.mark.parametrize("row", ROWS)
 def test_the_kind_decides_the_flags(row: Topic) -> None:
-    sent = row.message(b"x", **{name: "a" if name != "marker" else "1" for name in row.names})
+    sent = row.message(b"x", **{name: SPECIAL.get(name, "a") for name in row.names})
     assert sent.retain is (row.kind is Kind.STATE)
     assert sent.qos == (0 if row.kind is Kind.BLOB else 1)
     assert (sent.expires_s is not None) is (row.kind in (Kind.COMMAND, Kind.BLOB))
@@ -227,7 +234,7 @@ def test_an_order_is_text_or_json(payload: bytes, order: Order) -> None:
     assert read(message("camera/ip1/order/Goto", payload), NOW).payload == order
 
 
-TOPICS = st.sampled_from([row.name(**{n: "a" if n != "marker" else "1" for n in row.names}) for row in TABLE])
+TOPICS = st.sampled_from([row.name(**{name: SPECIAL.get(name, "a") for name in row.names}) for row in TABLE])
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
     lambda inner: (

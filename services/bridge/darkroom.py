@@ -22,7 +22,10 @@ from services.bridge.viewer import Viewer
 from services.bus import Message
 
 MAP, META, STATIC_MAP = "/map", "/map_metadata", "/static_map"
+LEAVE_S = 2.0  # saying goodbye to a master that may hang
 LOG_FORMAT = "%(asctime)s.%(msecs)03d %(levelname)-7s %(name)s: %(message)s"
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -68,12 +71,16 @@ def run(wanted: Wanted, connection: Connection, every_s: float) -> None:
         node.publish(META, grid["info"])
     viewers = {cam: Viewer(cam, prefix, lens, node) for cam, (prefix, lens) in wanted.cameras.items()}
     stopping = threading.Event()
-    threading.Thread(target=_report, args=(connection, viewers, links, stopping, every_s), daemon=True).start()
+    threading.Thread(
+        target=_report, args=(wanted.node, connection, viewers, links, stopping, every_s), daemon=True
+    ).start()
     _listen(connection, viewers)
     stopping.set()
     for one in viewers.values():
         one.end()
-    node.close()
+    leaving = threading.Thread(target=node.close, daemon=True)
+    leaving.start()
+    leaving.join(LEAVE_S)
     os._exit(0)  # threads of rospy would hold up the end
 
 
@@ -87,11 +94,19 @@ def _listen(connection: Connection, viewers: dict[str, Viewer]) -> None:
 
 
 def _report(
-    connection: Connection, viewers: dict[str, Viewer], links: list[Message], stopping: threading.Event, every_s: float
+    node: str,
+    connection: Connection,
+    viewers: dict[str, Viewer],
+    links: list[Message],
+    stopping: threading.Event,
+    every_s: float,
 ) -> None:
     """A thread's body."""
     while not stopping.wait(every_s):
         link = links[-1].value if links else None
+        if getattr(link, "ended", False):
+            log.error("%s: %s", node, getattr(link, "text", ""))
+            os._exit(1)  # the bridge starts another
         shown, decoded = (sum(getattr(one, name) for one in viewers.values()) for name in ("shown", "decoded"))
         try:
             connection.send(Done(shown, decoded, getattr(link, "text", "not yet"), bool(getattr(link, "up", False))))

@@ -69,14 +69,15 @@ def build(kind: MessageClass, fields: Fields) -> Any:
 def on_the_wire(message: Any) -> bytes:
     """A message as rospy's connections carry it, its length before it; BadMessage when it cannot be serialised."""
     buffer = BytesIO()
+    buffer.seek(LENGTH.size)
     try:
         message.serialize(buffer)
     except (ValueError, OverflowError) as error:
         raise BadMessage(f"{message._type}: {error}") from error
     except _serialization_error() as error:
         raise BadMessage(f"{message._type}: {error}") from error
-    data = buffer.getvalue()
-    return LENGTH.pack(len(data)) + data
+    LENGTH.pack_into(buffer.getbuffer(), 0, buffer.tell() - LENGTH.size)
+    return buffer.getvalue()
 
 
 def fields_of(message: Any) -> Fields:

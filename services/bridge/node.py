@@ -106,5 +106,5 @@ def ports(rules: Iterable[Rule]) -> Ports:
             inlets[rule.ros] = Inlet(rule.ros, rule.type)
             continue
         queue = max(rule.queue, outlets[rule.ros].queue if rule.ros in outlets else 0)
-        outlets[rule.ros] = Outlet(rule.ros, rule.type, rule.latch, rule.replay, queue)
+        outlets[rule.ros] = Outlet(rule.ros, rule.type, rule.latches, rule.replay, queue)
     return Ports(tuple(outlets.values()), tuple(inlets.values()))

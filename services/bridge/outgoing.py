@@ -24,7 +24,7 @@ class Outgoing:
         self._waiting: list[bytes] = []
         self._greeted: tuple[Any, ...] = ()  # connections that have got what is kept
         self._connections: Callable[[], list[Any]] = list
-        self._lock = threading.RLock()  # a connection that breaks in a write tells us so within it
+        self._lock = threading.Lock()
 
     def attach(self, topic: Any) -> None:
         """The topic of rospy that it speaks for; until then messages are only kept."""
@@ -54,20 +54,21 @@ class Outgoing:
         if not self._waiting:
             return
         with self._lock:
-            data, self._waiting = b"".join(self._waiting), []
-            for connection in self._greeted:
-                self._write(connection, data)
+            data = self._waiting[0] if len(self._waiting) == 1 else b"".join(self._waiting)
+            self._waiting = []
+            gone = [connection for connection in self._greeted if not self._write(connection, data)]
+        self._close(gone)
 
     def peer_subscribe(self, topic: str, publish: Any, publish_to_peer: Any) -> None:
         """Greets whoever is new. Which connection that is rospy does not say."""
         with self._lock:
-            self.flush()
+            waiting, self._waiting = b"".join(self._waiting), []  # for those who are here already
+            gone = [one for one in self._greeted if waiting and not self._write(one, waiting)]
             kept = b"".join(self._kept.values())
-            for connection in self._connections():
-                if connection not in self._greeted:
-                    self._greeted = (*self._greeted, connection)
-                    if kept:
-                        self._write(connection, kept)
+            new = [one for one in self._connections() if one not in self._greeted]
+            self._greeted = (*self._greeted, *new)
+            gone += [one for one in new if kept and not self._write(one, kept)]
+        self._close(gone)
 
     def peer_unsubscribe(self, topic: str, peers: int) -> None:
         """Forgets who has gone."""
@@ -75,10 +76,16 @@ class Outgoing:
             here = self._connections()
             self._greeted = tuple(one for one in self._greeted if one in here)
 
-    def _write(self, connection: Any, data: bytes) -> None:
-        """Into rospy's queue; its thread does the sending."""
+    def _write(self, connection: Any, data: bytes) -> bool:
+        """Into rospy's queue, whose thread does the sending; False when the connection has ended."""
         try:
             connection.write_data(data)
         except self._broken as error:
-            log.debug("a subscriber has gone: %s", error)
+            log.info("a subscriber has gone: %s", error)
+            return False
+        return True
+
+    def _close(self, gone: list[Any]) -> None:
+        """Never under our lock: rospy takes its own to close, and holds it while it tells us of another."""
+        for connection in gone:
             connection.close()

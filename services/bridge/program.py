@@ -91,12 +91,12 @@ def start(config: Config, post: Post) -> Iterator[Bridge]:
     """The service with its node; ConfigError when the rules cannot be used, or ROS is not installed."""
     rules = rulebook.load(config.folder / config.rules, config.cameras, _types(config))
     parts = _parts(config)
-    try:
-        with closing(_node(config, _all_ports(config, rules, parts), post)) as node:
+    with closing(_node(config, _all_ports(config, rules, parts), post)) as node:
+        try:
             yield Bridge(config.home, rules, node, parts)
-    finally:
-        for part in parts:
-            part.close()
+        finally:
+            for part in parts:
+                part.close()
 
 
 def _types(config: Config) -> rulebook.Check:

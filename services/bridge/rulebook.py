@@ -71,7 +71,7 @@ def collisions(rules: list[Numbered]) -> Iterator[tuple[int, str]]:
         if rule.ros in OWN:
             yield index, f"expected another topic than {rule.ros}, which the bridge says itself"
         other = first.setdefault(rule.ros, rule)
-        for name in ("type", "direction", "latch", "replay"):
+        for name in ("type", "direction", "latches", "replay"):
             here, there = getattr(rule, name), getattr(other, name)
             if here != there:
                 yield index, f"expected {name} {there!r} as in another rule for {rule.ros}, got {here!r}"

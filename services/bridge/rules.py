@@ -16,7 +16,7 @@ from pydantic import BaseModel, Field, field_validator, model_validator
 
 from services import topics
 from services.bridge import template
-from services.bus import Message
+from services.bus import Message, topic_matches
 from services.errors import BadMessage
 from services.section import Section
 
@@ -40,7 +40,7 @@ class Rule(Section):
     fields: Fields = {}  # to_ros: from levels, `{payload}`, `{payload.key}`, `{topic}`, `{received}`
     payload: Any = None  # to_mqtt: a text, or a mapping that becomes JSON
     tables: dict[str, dict[str, Any]] = {}  # of a field (`level`) or of `payload`: text to value, after the template
-    latch: bool = False  # ROS keeps the newest message for who comes later
+    latch: bool | None = None  # ROS keeps the newest message for who comes later; not said: as MQTT does there
     replay: bool = False  # who comes later is sent the newest message of every MQTT topic, and only he
     queue: int = Field(default=100, ge=1, le=100_000)  # per subscriber; the oldest goes when it is full
     rate: float | None = Field(default=None, gt=0)  # per second and topic at most; of what comes faster the newest goes
@@ -104,6 +104,14 @@ class Rule(Section):
             raise ValueError("expected no + or # in mqtt of a rule to_mqtt")
 
     @cached_property
+    def latches(self) -> bool:
+        """Whether the newest message is kept: what the table calls a state is retained on MQTT, and latched on ROS."""
+        if self.latch is not None:
+            return self.latch
+        kinds = [row.kind for row in topics.TABLE if topic_matches(row.filter, self.filter)]
+        return self.direction == "to_ros" and not self.replay and kinds == [topics.Kind.STATE]
+
+    @cached_property
     def filter(self) -> str:
         """The MQTT filter to subscribe to."""
         return LEVEL.sub("+", self.mqtt)
@@ -115,9 +123,10 @@ class Rule(Section):
         return re.compile(text.replace(r"/\#", r"(?:/.*)?").replace(r"\#", ".*").replace(r"\+", "[^/]+"))
 
 
-@dataclass(frozen=True)
+@dataclass
 class Heard:
-    """A bus message that was read: `row` and `levels` where the topic table knows it."""
+    """A bus message that was read: `row` and `levels` where the topic table knows it. Nobody changes it; frozen it
+    would cost a microsecond of each message more."""
 
     message: Message
     payload: str | bytes

@@ -205,6 +205,7 @@ def _apart(filters: list[str]) -> tuple[str, ...]:
     return tuple(one for one in each if not any(other != one and topic_matches(other, one) for other in each))
 
 
+@lru_cache(REMEMBERED_TOPICS)
 def _known(topic: str) -> tuple[topics.Topic | None, dict[str, str]]:
     """The row of the topic table; none for topics of the rules' author."""
     try:

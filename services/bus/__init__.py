@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
 
 WAKE_TOPIC = "/bus/wake"  # posted to end a wait; no service sees it
+SESSION_TOPIC = "/bus/session"  # posted at each connection; `value`: whether the broker had kept our messages
 LOST_TOPIC = "/bus/lost"  # posted when the connection breaks, to a service that has subscribed to it
 
 

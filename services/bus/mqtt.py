@@ -20,7 +20,7 @@ import paho.mqtt.client as paho
 from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.reasoncodes import ReasonCode
 
-from services.bus import LOST_TOPIC, WAKE_TOPIC, Delivery, Message, connection, topic_matches
+from services.bus import LOST_TOPIC, SESSION_TOPIC, WAKE_TOPIC, Delivery, Message, connection, topic_matches
 from services.bus.connection import CONNECT_TIMEOUT_S, WINDOW, Address
 from services.bus.outbox import Outbox
 
@@ -46,7 +46,6 @@ class MqttBus:
     ) -> None:
         self.address = address
         self.connections = 0
-        self.session_present = False
         self._protocol = address.protocol
         self._negotiated = address.protocol == 4
         self._will = will
@@ -245,11 +244,12 @@ class MqttBus:
             log.info("connected to %s:%s", self.address.host, self.address.port)
             self._told = ""
         self._client = client
-        self.session_present = bool(flags.session_present)
         self._acknowledged.clear()
         self.connections += 1
         self._up = self.connections  # before the filters are read: what is asked for meanwhile sees that it is up
         self._subscribe(client, self._filters)
+        if SESSION_TOPIC in self._filters:
+            self.post(Message(SESSION_TOPIC, value=bool(flags.session_present)))
         self._inbox.put(WAKE)
 
     def _subscribe(self, client: paho.Client, filters: Sequence[str]) -> None:

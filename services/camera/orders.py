@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, TakeLens
+from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, CalibrateZoom, TakeLens
 from services.camera.commands import HideLens, PlaySound, RecordSound, VideoMode
 from services.camera.places import name_of
 from services.camera.requests import Direction, Refused, SetPicture
+from services.camera.scan.wish import ScanFor
 from services.payloads import Who
 
 RANKS: dict[Who, int] = {"scan": 0, "mission": 1, "human": 2}
@@ -46,15 +47,6 @@ class MoveBy:
     direction: Direction
     speed: int
     seconds: float
-
-
-@dataclass(frozen=True)
-class ScanFor:
-    """Look for these targets at these places; None: the configured ones. `full`: every place, in both picture modes."""
-
-    targets: tuple[int, ...] | None = None
-    places: tuple[str, ...] | None = None
-    full: bool = False
 
 
 @dataclass(frozen=True)
@@ -128,7 +120,7 @@ class Calibrate:
     """Learn the motors: turn with every speed."""
 
 
-Calibration = Calibrate | CalibrateLens | CalibrateMount
+Calibration = Calibrate | CalibrateLens | CalibrateMount | CalibrateZoom
 Motor = GotoPlace | LookAt | MoveBy | ScanFor | Calibration
 Itself = Options | VideoMode | HideLens | RecordSound | PlaySound | Broadcast | Restart | TakeLens  # all but its motors
 Command = Motor | Halt | EndScan | SavePlace | RemovePlace | ShowScan | Targets | Routine | Itself
@@ -230,10 +222,14 @@ def _zoom(value: Any) -> Command:
 def _scan(value: Any) -> Command:
     if not isinstance(value, dict):
         return ScanFor() if _flag(value) else EndScan()
-    if unknown := set(value) - {"targets", "places", "full"}:
-        raise ValueError(f"expected targets, places and full, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
-    targets, places, full = value.get("targets"), value.get("places"), _flag(value.get("full", "off"))
-    return ScanFor(_markers(targets) if targets else None, _names(places) if places else None, full)
+    if unknown := set(value) - {"targets", "places", "full", "frames"}:
+        raise ValueError(f"expected targets, places, full, frames, got {', '.join(sorted(map(str, unknown)))[:80]!r}")
+    if (frames := value.get("frames")) not in (None, *range(1, 51)):
+        raise ValueError(f"expected 1 to 50 frames, got {str(frames)[:80]!r}")
+    told: dict[str, Any] = {
+        k: read(value[k]) for k, read in (("targets", _markers), ("places", _names)) if value.get(k)
+    }
+    return ScanFor(**told, full=_flag(value.get("full", "off")), frames=frames)
 
 
 def _routine(value: Any) -> Command:
@@ -276,6 +272,7 @@ READERS: dict[str, Callable[[Any], Command]] = {
     "CalibratePtz": _calibrate,
     "CalibrateLens": CalibrateLens.read,
     "CalibrateMount": CalibrateMount.read,
+    "CalibrateZoom": CalibrateZoom.read,
     "SetCameraInfo": TakeLens.read,
 }
 KEYS = {name.lower(): (name, reader) for name, reader in READERS.items()}

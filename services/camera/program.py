@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
+from math import radians
+
+import numpy as np
 
 from services import document
 from services.camera.address import Address
@@ -75,5 +78,6 @@ def eye(config: Config) -> Eye:
             raise ConfigError([f"{file}:1: {error}"]) from error
     mount = config.mount.mount() if config.mount else None
     zoom = levels.read(levels.of_lens(config.folder / config.camera_info)) if config.camera_info is not None else ()
-    noise = config.reading_noise_deg
-    return Eye(config.name, config.dictionary, lens, mount, config.zoom_range[0], zoom, angle_noise_deg=noise)
+    widest, noise, (doubt_m, doubt_deg) = config.zoom_range[0], config.reading_noise_deg, config.mount_doubt
+    doubt = np.diag(np.square([doubt_m] * 3 + [radians(doubt_deg)] * 3))
+    return Eye(config.name, config.dictionary, lens, mount, widest, zoom, angle_noise_deg=noise, mount_doubt=doubt)

@@ -23,7 +23,7 @@ from services.camera.commands import VideoMode
 from services.camera.device import REPLY, Sender
 from services.camera.discovery import Discovery
 from services.camera.health import IDLE_S, Health
-from services.camera.orders import Command, GotoPlace, LookAt, ScanFor
+from services.camera.orders import Command, GotoPlace, LookAt
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
 from services.camera.ptz.motors import Motors
@@ -32,6 +32,7 @@ from services.camera.requests import GetPicture, Identify, Identity, Picture, Ra
 from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
 from services.camera.scan.sightings import Eye
+from services.camera.scan.wish import ScanFor
 from services.camera.settings import Config
 from services.camera.sound.takes import Takes
 from services.camera.upkeep import Upkeep

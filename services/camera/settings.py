@@ -8,6 +8,7 @@ from zoneinfo import available_timezones
 
 from pydantic import Field, SecretStr, field_validator, model_validator
 
+from services.camera import parameters
 from services.camera.address import Address
 from services.camera.ptz.goal import Limits
 from services.camera.video.settings import SnapshotSettings, StreamSettings
@@ -86,6 +87,15 @@ class MountSettings(Section):
         return Mount(**self.model_dump())
 
 
+def _under(given: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+    """Both together; where both say something, `values` count."""
+    parts = {
+        key: _under(inner, values[key]) for key, inner in given.items()
+        if isinstance(inner, dict) and isinstance(values.get(key), dict)
+    }  # fmt: skip
+    return {**given, **values, **parts}
+
+
 class Config(Section):
     """One camera. `name`, `folder` and `state` are given by the program."""
 
@@ -93,6 +103,7 @@ class Config(Section):
     folder: Path = Path()
     state: Path | None = None  # where what is learnt of the camera is kept; None: nowhere
     profile: Literal["full", "low"] = "full"  # "low": what is not given is as in LOW
+    parameters: Path | None = None  # a ROS node's parameters.yaml: what is not given is as there
     brand: str = "amcrest"  # a module of `camera/brands/`
     url: str
     rtsp_port: int = Field(default=554, ge=1, le=65535)
@@ -116,6 +127,7 @@ class Config(Section):
     tilt_range: Pair = (-10.0, 108.0)
     zoom_range: Pair = (0.0, 8.0)
     mount: MountSettings | None = None
+    mount_doubt: Pair = (0.0, 0.0)  # m and degrees, each axis, one standard deviation: as a calibration tells them
     reading_noise_deg: float = Field(default=0.05, ge=0, le=2)  # of pan and tilt, one standard deviation
     routine: tuple[str, ...] | None = None  # places that a scan visits, in order; None: all, on the shortest way
     frames: int = Field(default=4, ge=1, le=50)  # at each place of a scan
@@ -128,14 +140,17 @@ class Config(Section):
     stream: StreamSettings = StreamSettings()
     snapshot: SnapshotSettings = SnapshotSettings()
     scan_pictures: Literal["stream", "snapshot"] = "stream"  # what a scan looks at, where the camera has a stream
+    hits: int = Field(default=100, ge=0, le=10000)  # pictures of what scans have seen that are kept; 0: none
     workers: int = Field(default=1, ge=1, le=8)  # processes that look for markers during a scan
 
     @model_validator(mode="before")
     @classmethod
-    def profile_gives_what_is_not_said(cls, values: Any) -> Any:
-        if isinstance(values, dict) and values.get("profile") == "low":
-            return {**LOW, **values}
-        return values
+    def others_give_what_is_not_said(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        if isinstance(values.get("parameters"), str | Path):
+            values = _under(parameters.read(Path(values.get("folder", "")) / values["parameters"]), values)
+        return {**LOW, **values} if values.get("profile") == "low" else values
 
     @field_validator("url")
     @classmethod

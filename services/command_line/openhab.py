@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from services import document
+from services import document, secret_store
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.openhab import folder as folders
@@ -102,6 +102,9 @@ def check_(
     files: Annotated[list[Path], typer.Argument(help=f"Files ({', '.join(KINDS)}), or folders of them.")],
     openhab: OpenHab = "5",
     json: Annotated[bool, typer.Option("--json", help="Data instead of text.")] = False,
+    live: Annotated[
+        str | None, typer.Option("--live", help="A running OpenHAB (5.1 on) to ask too; its token: OPENHAB_TOKEN.")
+    ] = None,
 ) -> None:
     """Check files of OpenHAB as strictly as it does itself; exit 1 when one has an error."""
     texts = folders.texts(files)
@@ -110,6 +113,10 @@ def check_(
         raise ConfigError([f"{name}:1: file: expected one of {', '.join(KINDS)}" for name in unknown])
     version = parse(openhab)
     found = check(texts, version)
+    if live is not None:
+        from services.openhab.live import check as ask  # HTTP, for this alone
+
+        found = sorted([*found, *ask(texts, live.rstrip("/"), secret_store.lookup()("OPENHAB_TOKEN"))])
     if json:
         import json as form
 

@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Self
 
-from pydantic import SecretStr, field_validator
+from pydantic import SecretStr, field_validator, model_validator
 
 from services import topics
 from services.bus import Message
 from services.errors import ConfigError, Unavailable
-from services.history import answers
+from services.history import answers, keeping
+from services.history.keeping import Keep
+from services.home import Home
 from services.payloads import HistoryGet, HistoryReply
 from services.runner import Post
 from services.section import Section
@@ -25,7 +28,10 @@ from services.storage import Address, Storage, open_storage, read_address
 log = logging.getLogger(__name__)
 
 AGAIN_S = 1.0  # between attempts to open the database
-COUNTERS = ("questions", "unanswered")
+COUNTERS = ("questions", "unanswered", "pieces")
+ROUND_EVERY_S = 600.0  # of keeping house
+PAUSE_S = 0.02  # between its pieces: the writer and questions come first
+SETTLE_S = 60.0  # after the database was opened
 
 
 class Config(Section):
@@ -34,6 +40,8 @@ class Config(Section):
     url: str  # as in the section persistence: the same database
     password: SecretStr | None = None
     view_database: str = "OpenHAB"
+    keep: tuple[Keep, ...] = ()  # how long; an item that no line names is kept for ever
+    home: Home
     folder: Path = Path()
 
     @field_validator("url")
@@ -51,11 +59,16 @@ class Config(Section):
         password = self.password.get_secret_value() if self.password else None
         return read_address(self.url, password=password, view_database=self.view_database, folder=self.folder)
 
+    @model_validator(mode="after")
+    def keeps_known_items(self) -> Self:
+        keeping.by_item(self.keep, self.home)
+        return self
+
 
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[History]:
     """The service; a database that is away is waited for."""
-    service = History(lambda: open_storage(config.address))
+    service = History(lambda: open_storage(config.address), keeping.by_item(config.keep, config.home))
     try:
         yield service
     finally:
@@ -65,12 +78,15 @@ def start(config: Config, post: Post) -> Iterator[History]:
 class History:
     """The service; see `services.runner.Service`."""
 
-    def __init__(self, opener: Callable[[], Storage]) -> None:
+    def __init__(self, opener: Callable[[], Storage], lines: Mapping[str, Keep] | None = None) -> None:
+        self._lines = lines or {}
+        self._round: Iterator[int] | None = None  # of keeping house, while one is going on
         self.subscribes = (topics.HISTORY_GET.filter,)
-        self.due: float | None = None
+        self.due: float | None = 0.0 if self._lines else None
         self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self._opener = opener
         self._storage: Storage | None = None
+        self._opened_at: float | None = None
         self._not_before = 0.0
         self._reason = ""
 
@@ -86,14 +102,34 @@ class History:
             yield also
 
     def tick(self, now: float) -> tuple[Message, ...]:
-        """Nothing to do between questions."""
+        """One piece of keeping house, when that is due."""
+        if self.due is not None and now >= self.due:
+            try:
+                self._keep_house(now)
+            except Unavailable as error:
+                self.close()
+                self._lost(error, now)
+                self._round, self.due = None, now + ROUND_EVERY_S
         return ()
+
+    def _keep_house(self, now: float) -> None:
+        if self._opened_at is None or now - self._opened_at < SETTLE_S:
+            self._opened(now)  # a writer that waited for the database too has rows from before to write
+            self.due = (self._opened_at or now) + SETTLE_S
+            return
+        if self._round is None:
+            self._round = keeping.pieces(self._opened(now), self._lines, now)
+        rows = next(self._round, None)
+        self.counters["pieces"] += rows is not None
+        if rows is None:
+            self._round = None
+        self.due = now + (ROUND_EVERY_S if rows is None else PAUSE_S)
 
     def close(self) -> None:
         """Ends the connection."""
         if self._storage is not None:
             self._storage.close()
-            self._storage = None
+        self._storage = self._opened_at = self._round = None
 
     def _reply(self, asked: HistoryGet, now: float) -> HistoryReply:
         try:
@@ -116,7 +152,7 @@ class History:
                 self._storage = self._opener()
             except ConfigError as error:
                 raise Unavailable(str(error)) from error
-            self._reason = ""
+            self._reason, self._opened_at = "", now
         return self._storage
 
     def _lost(self, error: Unavailable, now: float) -> None:

@@ -59,6 +59,8 @@ class Decisions:
         for one in gathered:
             if isinstance(one, State) and self._rule(one.item).stores:
                 before = new.get(one.item) or known.get(one.item)
+                if before is not None and before.kind == one.kind and (before.unit or one.kind != "Number"):
+                    continue  # as nearly always
                 item = self._item(one, before)
                 if before is None or (before.kind, before.unit) != (item.kind, item.unit):
                     new[one.item] = item
@@ -97,7 +99,7 @@ class Decisions:
             if lines and name in items and state.text not in SPECIAL:
                 again = replace(state, time=next_time())
                 if self._passes(again, rule, lines):
-                    self._keep(batch, again, items[name].unit)
+                    self._keep(batch, again, rows.sample(again, items[name].unit), items[name].unit)
         return batch
 
     def _add_state(self, batch: Batch, state: State, items: Mapping[str, Item]) -> None:
@@ -111,7 +113,7 @@ class Decisions:
         self._last[state.item], self._heard[state.item] = value, state
         lines = [n for n, line in enumerate(rule.lines) if line.wants(changed=changed, retained=state.retained)]
         if lines and self._passes(state, rule, lines):
-            self._keep(batch, state, unit)
+            self._keep(batch, state, sample, unit)
 
     def _passes(self, state: State, rule: Rule, lines: Iterable[int]) -> bool:
         """Whether the filters of one of these lines agree; each that does remembers the state."""
@@ -134,8 +136,7 @@ class Decisions:
             return passed
         return Kept(state.kind, stored.num, stored.text or "", stored.time)
 
-    def _keep(self, batch: Batch, state: State, unit: str | None) -> None:
-        sample = rows.sample(state, unit)
+    def _keep(self, batch: Batch, state: State, sample: Sample, unit: str | None) -> None:
         if not rows.fits(state, unit):
             self._count_mismatch(state, unit)
         self._stored[state.item] = sample

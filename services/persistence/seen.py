@@ -32,6 +32,11 @@ class Seen:
         self._fresh: deque[tuple[int, int]] = deque(maxlen=REMEMBERED)  # not committed yet
         self._turn = 0
 
+    @property
+    def any(self) -> bool:
+        """Whether there ever was one, so that the broker must know us."""
+        return bool(self._known)
+
     def learn(self, turns: Iterable[SeenTurn]) -> None:
         """What the database remembers."""
         for turn in sorted(turns, key=lambda one: one.turn):

@@ -16,10 +16,10 @@ from pathlib import Path
 from pydantic import Field, SecretStr, field_validator
 
 from services import topics
-from services.bus import Message
+from services.bus import SESSION_TOPIC, Message
 from services.errors import BadMessage, ConfigError, Unavailable
 from services.home import Home
-from services.persistence import rows, rulebook, strategies
+from services.persistence import broker, rows, rulebook, strategies
 from services.persistence.connection import Connection
 from services.persistence.decisions import Decisions
 from services.persistence.seen import Seen
@@ -30,8 +30,11 @@ from services.storage import Address, Batch, Row, Storage, open_storage, read_ad
 
 log = logging.getLogger(__name__)
 
+DIAGNOSTIC_EVERY_S = 1.0
+ABOUT_BROKER = (*broker.FILTERS, SESSION_TOPIC)
 CLOCK_STEP_US = 1_000_000  # a clock that steps back more than this is told
-COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "restored", "reconnects", "redelivered")
+COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "restored", "reconnects", "redelivered",
+            "broker_dropped", "sessions_lost")  # fmt: skip
 
 
 class Config(Section):
@@ -41,6 +44,7 @@ class Config(Section):
     password: SecretStr | None = None  # of the database's user
     view_database: str = "OpenHAB"  # where the views with OpenHAB's layout go (MariaDB, MySQL)
     restore_after_s: float = Field(default=2.0, ge=0)  # how long the broker may take for its retained states
+    broker_queue: int = Field(default=1_000_000, ge=1)  # the broker's max_queued_messages, as in mosquitto.conf
     name: str = "persistence"
     strategies: Path | None = None  # persistence.yaml; without it `persist` of each item in home.yaml says when
     home: Home
@@ -93,7 +97,8 @@ class Persistence:
 
     def __init__(self, config: Config, opener: Callable[[], Storage]) -> None:
         own_status = topics.SERVICE_STATUS.filter_for(service=config.name)  # its echo shows that there is a broker
-        self.subscribes = (*(row.filter for row in topics.TABLE if row.stored), own_status)
+        stored = (row.filter for row in topics.TABLE if row.stored)
+        self.subscribes = (*stored, own_status, *broker.FILTERS, SESSION_TOPIC)
         self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self.connection = Connection(opener, self.counters)
         self._home = config.home
@@ -105,9 +110,13 @@ class Persistence:
         self._fresh: list[rows.State | Row] = []  # of it what is not there already
         self._seen = Seen(config.name)
         self._name = config.name
+        self._broker = broker.Watch(config.broker_queue, self.counters)
+        self._noted: int | None = None  # of the broker's count of dropped messages, in the database
+        self._next_diagnostic = 0.0
         self._batch = Batch()  # decided, not committed yet
         self._time = 0
         self._learnt = False
+        self._connected = False  # once, in this life
 
     def prepare(self) -> None:
         """Learns the last values before the first message, where the database is there: its times go on from those."""
@@ -127,6 +136,10 @@ class Persistence:
 
     def handle(self, message: Message, now: float) -> tuple[Message, ...]:
         """Takes a message for the next tick."""
+        if message.topic in ABOUT_BROKER:
+            self._about_broker(message, now)
+            return ()
+        self._broker.came(now)
         known = topics.read(message, now)
         self._restore.begin(now)
         row = rows.read(known, self._next_time(message.received or now), self._home) if known.topic.stored else None
@@ -138,18 +151,45 @@ class Persistence:
 
     def tick(self, now: float) -> list[Message]:
         """Commits what was gathered; Unavailable while the database is away."""
-        storage = self.connection.storage(now)
+        try:
+            storage = self.connection.storage(now)
+        except Unavailable as error:
+            raise Unavailable(f"{error}; {self._broker.waits(now)}") from error
         try:
             self._learn(storage)
             self._decide(storage)
             if fired := self._timetable.fired(now):
                 self._batch.extend(self._decisions.fired(fired, storage.items, lambda: self._next_time(now)))
             self._commit(storage)
+            self._note(storage)
         except Unavailable as error:
             self.connection.lost(error, now)
             raise
         self.connection.worked()
-        return self._restored(storage, now)
+        self._broker.goes_on()
+        return [*self._restored(storage, now), *self._diagnostic(now)]
+
+    def _about_broker(self, message: Message, now: float) -> None:
+        if message.topic == SESSION_TOPIC:
+            known_before = self._connected or self._seen.any
+            told = self._broker.session(present=message.value is True, known_before=known_before, now=now)
+            self._connected = True
+        else:
+            told = self._broker.heard(message.topic, message.payload, now)
+        if told:
+            log.warning("%s", told)
+
+    def _note(self, storage: Storage) -> None:
+        """The broker's count outlives us: it may drop messages while we are away."""
+        if self._broker.dropped is not None and self._broker.dropped != self._noted:
+            self._noted = self._broker.dropped
+            storage.note(self._name, "dropped", self._noted)
+
+    def _diagnostic(self, now: float) -> list[Message]:
+        if now < self._next_diagnostic:
+            return []
+        self._next_diagnostic = now + DIAGNOSTIC_EVERY_S
+        return [topics.DIAGNOSTICS.message(self._broker.diagnostic(now), component=f"{self._name}/broker")]
 
     def _next_time(self, at: float) -> int:
         """Microseconds, never the same twice and never back: a clock that steps back must not reorder rows."""
@@ -169,6 +209,8 @@ class Persistence:
         self._decisions.learn(last, storage.last_diagnostics())
         self._time = max([self._time, *(sample.time for sample in last.values())])
         self._seen.learn(storage.seen(self._name))
+        self._noted = storage.noted(self._name, "dropped")
+        self._broker.learn(self._noted)
         self._learnt = True
 
     def _decide(self, storage: Storage) -> None:

@@ -7,7 +7,7 @@ An update that two strategies or two lines want makes one row.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from services.home import Home
 from services.persistence.cron import Cron
@@ -44,11 +44,11 @@ class Rule:
 
     lines: tuple[Line, ...]
     restore: bool
+    stores: bool = field(init=False)  # whether the item is ever stored: asked for every message, so reckoned once
 
-    @property
-    def stores(self) -> bool:
-        """Whether the item is ever stored."""
-        return any(line.change or line.update or line.crons for line in self.lines)
+    def __post_init__(self) -> None:
+        wanted = any(line.change or line.update or line.crons for line in self.lines)
+        object.__setattr__(self, "stores", wanted)
 
 
 def rule(names: Iterable[str]) -> Rule:

@@ -218,6 +218,13 @@ class Storage(Protocol):
         """Where a marker was seen, newest first."""
         ...
 
+    def note(self, client: str, name: str, value: int) -> None:
+        """Keeps a number of a writer's own."""
+
+    def noted(self, client: str, name: str) -> int | None:
+        """The number that was kept; None when none was."""
+        ...
+
     def close(self) -> None:
         """Ends the connection."""
 

@@ -131,6 +131,17 @@ class MysqlStorage:
         escaped = self._connection.escape(client)
         return [SeenTurn(*row) for row in self.read(f"SELECT {sql.SEEN} FROM mqtt_seen WHERE client={escaped}")]
 
+    def note(self, client: str, name: str, value: int) -> None:
+        """See `Storage`."""
+        names = f"{self.quote(client)},{self.quote(name)}"
+        self.change(f"INSERT INTO mqtt_noted VALUES ({names},{int(value)}) ON DUPLICATE KEY UPDATE value=VALUES(value)")
+
+    def noted(self, client: str, name: str) -> int | None:
+        """See `Storage`."""
+        where = f"client={self.quote(client)} AND name={self.quote(name)}"
+        found = self.read(f"SELECT value FROM mqtt_noted WHERE {where}")
+        return int(found[0][0]) if found else None
+
     def quote(self, text: str) -> str:
         """See `Storage`."""
         return self._connection.escape(text)

@@ -152,6 +152,17 @@ class SqliteStorage:
         with _translated():
             return [SeenTurn(*row) for row in self._rows("SELECT * FROM mqtt_seen WHERE client=?", client)]
 
+    def note(self, client: str, name: str, value: int) -> None:
+        """See `Storage`."""
+        names = f"{self.quote(client)},{self.quote(name)}"
+        self.change(f"REPLACE INTO mqtt_noted VALUES ({names},{int(value)})")
+
+    def noted(self, client: str, name: str) -> int | None:
+        """See `Storage`."""
+        where = f"client={self.quote(client)} AND name={self.quote(name)}"
+        found = self.read(f"SELECT value FROM mqtt_noted WHERE {where}")
+        return int(found[0][0]) if found else None
+
     def quote(self, text: str) -> str:
         """See `Storage`."""
         return "'" + text.replace("'", "''") + "'"

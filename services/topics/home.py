@@ -11,7 +11,7 @@ HOME_STATE = Topic(
     Kind.STATE,
     str,
     ("openhab", "persistence"),
-    (*SHOWN, "camera-<cam>"),
+    (*SHOWN, "camera-<cam>", "hubs"),
     "the state of an item in OpenHAB's string form (`ON`, `21.5 °C`, `UNDEF`)",
     stored=True,
 )
@@ -19,7 +19,7 @@ HOME_COMMAND = Topic(
     "home/<item>/command",
     Kind.COMMAND,
     str,
-    (*STEERS, "camera-<cam>"),
+    (*STEERS, "camera-<cam>", "hubs"),
     ("openhab", "dashboard", "operator"),
     "sendCommand",
 )

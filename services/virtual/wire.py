@@ -19,7 +19,9 @@ class Wire(httpx.BaseTransport):
         self.now = 0.0
 
     def handle_request(self, request: httpx.Request) -> httpx.Response:
-        """One request and its answer; authentication as on the real wire."""
+        """One request and its answer; authentication as on the real wire. A camera that restarts refuses."""
+        if self.inside.device.booting(self.now):
+            raise httpx.ConnectError("connection refused", request=request)
         target = request.url.raw_path.decode()
         verdict = self.inside.door.judge(request.method, target, request.headers.get("Authorization"), self.now)
         if not verdict.passed:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from services.vision.frames import Mount, Transform, camera_in_apartment, camera_in_base
 from services.vision.mount_squares import (
+    ANGLE_DEG,
     CAMERA,
     SQUARE,
     Known,
@@ -81,8 +82,10 @@ class MountFit:
         return np.degrees(np.sqrt(np.diag(self.covariance)[3:6]))
 
 
-def fit(looks: Sequence[Look], known: Mapping[int, Known], guess: Mount) -> MountFit:
+def fit(looks: Sequence[Look], known: Mapping[int, Known], guess: Mount, angle_deg: float = ANGLE_DEG) -> MountFit:
     """The mount that explains the looks best. Of `guess` the kind and the arms count, its place and turn do not.
+
+    `angle_deg`: what the readings are off, one standard deviation.
 
     ValueError when fewer than three markers were seen, when they stand in a line, or when they explain nothing.
     """
@@ -93,7 +96,7 @@ def fit(looks: Sequence[Look], known: Mapping[int, Known], guess: Mount) -> Moun
     said = np.array([known[marker].position for marker in ids], float)
     if np.linalg.svd(said - said.mean(axis=0), compute_uv=False)[1] < FLAT:
         raise ValueError("the markers stand in one line: put one beside it")
-    problem = _problem(useful, ids, known, guess)
+    problem = _problem(useful, ids, known, guess, angle_deg)
     best = solved(problem, _start(problem, guess))
     for index in range(len(ids)):
         other = solved(problem, _flipped(problem, best[0], index))
@@ -101,7 +104,9 @@ def fit(looks: Sequence[Look], known: Mapping[int, Known], guess: Mount) -> Moun
     return _told(problem, *best)
 
 
-def _problem(looks: Sequence[Look], ids: list[int], known: Mapping[int, Known], guess: Mount) -> Problem:
+def _problem(
+    looks: Sequence[Look], ids: list[int], known: Mapping[int, Known], guess: Mount, angle_deg: float
+) -> Problem:
     candidates = tuple(_candidates(look, known[look.marker].size_m) for look in looks)
     kept = [(look, one) for look, one in zip(looks, candidates, strict=True) if one]
     if {look.marker for look, _ in kept} != set(ids):
@@ -113,6 +118,7 @@ def _problem(looks: Sequence[Look], ids: list[int], known: Mapping[int, Known], 
         np.array([known[marker].doubt_m for marker in ids], float),
         np.array([known[marker].size_m for marker in ids], float),
         guess,
+        angle_deg,
         tuple(one for _, one in kept),
     )
 

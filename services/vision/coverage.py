@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 REGIONS = (5, 3)  # across and down
 CORNERS, VIEWS = 8, 2  # that a region wants
-FEWEST, MOST = 14, 80  # views
+FEWEST, MOST = 14, 60  # views
 TILTED_DEG = 18.0  # the board's plane against the picture's
 TILTED_VIEWS = 2  # for each way
 MOVED = 0.05  # of the picture's width: a view this near to one before, and no more turned than that, adds little
@@ -89,6 +89,8 @@ class Album:
     @property
     def missing(self) -> str:
         """What to show next, for a person; empty when there is enough."""
+        if len(self.views) >= MOST:
+            return ""
         empty = np.argwhere(~self.regions)
         if len(empty):
             row, column = min(empty.tolist(), key=lambda at: (-abs(at[1] - 2), -abs(at[0] - 1)))

@@ -101,6 +101,12 @@ def camera_in_apartment(mount: Mount, pan_deg: float, tilt_deg: float) -> Transf
     return base_in_apartment(mount) @ camera_in_base(mount, pan_deg, tilt_deg)
 
 
+def axes_in_apartment(mount: Mount, pan_deg: float, tilt_deg: float) -> Array:
+    """The axes that pan and tilt turn the camera about at these readings: two unit vectors, rows, in the apartment."""
+    base = base_in_apartment(mount).rotation
+    return np.array([base[:, 2], base @ rotation_z(pan_deg)[:, 1]])
+
+
 def quaternion(rotation: Array) -> tuple[float, float, float, float]:
     """The unit quaternion (x, y, z, w), w >= 0, of a 3x3 rotation (largest-component method, Shepperd 1978)."""
     r = rotation

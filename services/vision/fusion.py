@@ -21,7 +21,6 @@ from services.vision.views import Sights
 Array = NDArray[np.float64]
 
 STEPS, CONVERGED = 10, 1e-7
-EXACT = 1e-9  # of angles and focal lengths that are said to be exact: keeps the normal matrix regular
 TRUSTED = 4.0  # numbers that the assumed corner noise counts as against the residuals seen
 
 
@@ -35,12 +34,14 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """The unknowns: turn and place of the marker; of each sight the camera's turn (g, 3) and the focal share (g,)."""
+    """The unknowns: turn and place of the marker; of each sight what is beside its reading and its focal length.
+
+    `beside` is (g, 4) in standard deviations: three of the camera's turns, and the focal length.
+    """
 
     turned: Array
     position: Array
-    aside: Array
-    longer: Array
+    beside: Array
 
 
 def fuse(sights: Sights, best: Hypothesis, prior: Prior | None = None) -> Place:
@@ -63,8 +64,7 @@ def _share(cost: float, freedom: int) -> float:
 
 
 def _fitted(sights: Sights, best: Hypothesis, prior: Prior | None) -> _State:
-    count = len(sights)
-    state = _State(best.orientation, best.places.mean(axis=0), np.zeros((count, 3)), np.zeros(count))
+    state = _State(best.orientation, best.places.mean(axis=0), np.zeros((len(sights), 4)))
     for _ in range(STEPS):
         residuals, slope = _linear(sights, state, prior)
         step = np.asarray(np.linalg.lstsq(slope, -residuals, rcond=None)[0], float)
@@ -75,23 +75,19 @@ def _fitted(sights: Sights, best: Hypothesis, prior: Prior | None) -> _State:
 
 
 def _moved(state: _State, step: Array) -> _State:
-    beside = step[6:].reshape(-1, 4)
-    return _State(
-        turned=state.turned @ turn(step[:3]),
-        position=state.position + step[3:6],
-        aside=state.aside + beside[:, :3],
-        longer=state.longer + beside[:, 3],
-    )
+    beside = state.beside + step[6:].reshape(-1, 4)
+    return _State(state.turned @ turn(step[:3]), state.position + step[3:6], beside)
 
 
 def _linear(sights: Sights, state: _State, prior: Prior | None) -> tuple[Array, Array]:
     """All residuals in standard deviations, and their derivative by the 6 + 4 g unknowns."""
     count = len(sights)
-    looks = np.array([rotation @ turn(aside) for rotation, aside in zip(sights.rotation, state.aside, strict=True)])
+    aside = np.einsum("gij,gj->gi", sights.swing, state.beside[:, :3])
+    looks = np.array([rotation @ turn(angles) for rotation, angles in zip(sights.rotation, aside, strict=True)])
     corners = SQUARE * sights.size[:, None, None]  # (g, 4, 3) in the marker's frame
     seen = np.einsum("gji,gcj->gci", looks, corners @ state.turned.T + (state.position - sights.lens_at)[:, None])
     x, y, z = np.moveaxis(seen, -1, 0)
-    longer = 1 + state.longer[:, None]
+    longer = 1 + (sights.focal_doubt * state.beside[:, 3])[:, None]
     rays = np.stack((x / z, y / z), axis=-1) * longer[..., None]
     off = (rays - sights.rays) / sights.noise[:, None, None]
     by_point = np.zeros((count, 4, 2, 3))
@@ -100,21 +96,20 @@ def _linear(sights: Sights, state: _State, prior: Prior | None) -> tuple[Array, 
     by_point /= sights.noise[:, None, None, None]
     by_place = np.einsum("gcki,gji->gckj", by_point, looks)
     by_turn = np.einsum("gckj,jm,gcmn->gckn", by_place, state.turned, -_cross(corners))
-    by_focal = (np.stack((x / z, y / z), axis=-1) / sights.noise[:, None, None])[..., None]
-    own = np.concatenate((np.einsum("gcki,gcin->gckn", by_point, _cross(seen)), by_focal), axis=-1)
+    by_focal = np.stack((x / z, y / z), axis=-1) * (sights.focal_doubt / sights.noise)[:, None, None]
+    by_swing = np.einsum("gcki,gcij,gjn->gckn", by_point, _cross(seen), sights.swing)
+    own = np.concatenate((by_swing, by_focal[..., None]), axis=-1)
     slope = np.zeros((count, 8, 6 + 4 * count))
     slope[..., :3], slope[..., 3:6] = by_turn.reshape(count, 8, 3), by_place.reshape(count, 8, 3)
     for index in range(count):
         slope[index, :, 6 + 4 * index : 10 + 4 * index] = own[index].reshape(8, 4)
-    return _with_priors(sights, state, prior, off.ravel(), slope.reshape(8 * count, -1))
+    return _with_priors(state, prior, off.ravel(), slope.reshape(8 * count, -1))
 
 
-def _with_priors(sights: Sights, state: _State, prior: Prior | None, off: Array, slope: Array) -> tuple[Array, Array]:
+def _with_priors(state: _State, prior: Prior | None, off: Array, slope: Array) -> tuple[Array, Array]:
     """The residuals of what is known besides: the readings, the focal lengths, the marker's normal."""
-    known = np.column_stack([sights.angle_noise] * 3 + [sights.focal_doubt]) + EXACT
-    beside = np.column_stack((state.aside, state.longer)) / known
-    rows = np.hstack((np.zeros((known.size, 6)), np.diag(1 / known.ravel())))
-    residuals, slopes = [off, beside.ravel()], [slope, rows]
+    rows = np.hstack((np.zeros((state.beside.size, 6)), np.eye(state.beside.size)))
+    residuals, slopes = [off, state.beside.ravel()], [slope, rows]
     if prior is not None:
         leaning = prior.slope(state.turned)
         residuals.append(prior.residuals(state.turned[:, 2]))

@@ -20,7 +20,7 @@ from services.vision.lens import Lens
 Array = NDArray[np.float64]
 
 CORNER_PX = 0.15  # what a corner is off, the lens calibration's share included
-ANGLE_DEG = 0.05  # what a reading is off
+ANGLE_DEG = 0.05  # what a reading is off, where nobody knows better
 LEVER_M, FREE_LEVER_M = 0.003, 0.04  # how well the arms are known: from a data sheet, and when they are all zero
 AXIS_DEG = 1.0  # how far tilt's zero and the sensor's roll may be off
 LEVEL_DEG = 3.0  # a mounting plate is level to that
@@ -62,6 +62,7 @@ class Problem:
     doubt: Array  # (m,)
     sizes: Array  # (m,)
     guess: Mount
+    angle_deg: float  # what a reading is off, one standard deviation
     candidates: tuple[tuple[Transform, ...], ...]  # of each look: the marker in the camera, the better first
 
     @property
@@ -193,7 +194,7 @@ def _of_look(problem: Problem, state: State, index: int) -> tuple[Array, Array]:
     swing = moves[:, :, 3:6] @ state.base.rotation[:, 2]  # of a growing pan
     sway = np.stack((swing, -moves[:, :, 6]), axis=-1)
     slopes, swayed = ((by_point @ one).reshape(8, -1) for one in (moves, sway))
-    spread = CORNER_PX**2 * np.eye(8) + radians(ANGLE_DEG) ** 2 * swayed @ swayed.T
+    spread = CORNER_PX**2 * np.eye(8) + radians(problem.angle_deg) ** 2 * swayed @ swayed.T
     whiten = np.linalg.inv(np.linalg.cholesky(spread))
     return whiten @ (near - look.corners).ravel(), whiten @ slopes
 

@@ -108,8 +108,9 @@ def _groups(views: Sequence[View], prior: Prior | None) -> list[_Group]:
 def _roughly(sights: Sights, prior: Prior | None) -> Place | None:
     """Where one sight has the marker; None when no marker explains it."""
     possible = ranked(sights, prior) if np.isfinite(sights.rays).all() else []
-    doubted = replace(sights, angle_noise=np.maximum(sights.angle_noise, radians(DOUBTED_DEG)))
-    return fusion.fuse(doubted, possible[0], prior) if possible else None
+    least = radians(DOUBTED_DEG)
+    swing = sights.swing if np.abs(sights.swing).max() > least else least * np.eye(3)[None]
+    return fusion.fuse(replace(sights, swing=swing), possible[0], prior) if possible else None
 
 
 def _agree(one: Place, other: Place) -> bool:

@@ -19,9 +19,9 @@ from services.vision.lens import Lens
 Array = NDArray[np.float64]
 
 RANDOM_PX = 0.02  # corner noise per axis of one frame, new in each, where their own scatter does not tell
-FIXED_PX = 0.018  # and what all frames of a place share: the pixel grid, the lens calibration
+FIXED_PX = 0.016  # and what all frames of a place share: the pixel grid, the lens calibration
 FIXED_SIDES = 0.0003  # of the marker's side, shared too: paper and print
-FIXED_SHARE = 0.6  # of the random noise: what makes a picture worse does it to both; measured from .02/.026 to .07/.04
+FIXED_SHARE = 0.5  # of the random noise: what makes a picture worse does it to both; measured from .02/.026 to .07/.04
 KNOWN_FROM = 8.0  # numbers that RANDOM_PX counts as against the frames' own scatter
 SAME_PLACE_M, SAME_PLACE_DEG = 0.005, 0.2  # readings that differ by less are one place, read with a jitter
 SAME_FOCAL = 1e-3  # share; a zoom measured anew in each frame is the same zoom
@@ -34,8 +34,10 @@ WEIGHINGS = 5
 class View:
     """One sighting: `corners` (4, 2) as `detect` gives them, seen through `lens` from `camera` (T_AC), `at` seconds.
 
-    `size_m` is the side of the printed black square, `angle_noise_deg` how well the pan and tilt readings are known,
-    `focal_doubt` the standard deviation of the lens's focal length as a share of it.
+    `size_m` is the side of the printed black square, `angle_noise_deg` how well the readings are known of pan and tilt,
+    which turn about `axes` (2, 3) in the apartment; None: about any. `focal_doubt` is the standard deviation of the
+    lens's focal length as a share of it, `aside_deg` that of its axis in any direction. A picture that was `enlarged`
+    has coarser corners by that factor.
     """
 
     lens: Lens
@@ -44,6 +46,9 @@ class View:
     size_m: float
     angle_noise_deg: float = 0.05
     focal_doubt: float = 0.0
+    aside_deg: float = 0.0
+    enlarged: float = 1.0
+    axes: Array | None = None
     at: float = 0.0
 
 
@@ -56,7 +61,7 @@ class Sights:
     lens_at: Array  # (g, 3), m
     size: Array  # (g,), m
     noise: Array  # (g,), rad, of a corner
-    angle_noise: Array  # (g,), rad, of the camera
+    swing: Array  # (g, 3, 3), rad: columns are turns of the camera, in its own frame, of one standard deviation each
     focal_doubt: Array  # (g,), share
 
     def __len__(self) -> int:
@@ -84,34 +89,46 @@ def by_place(views: Sequence[View]) -> list[list[int]]:
 def gather(places: Sequence[Sequence[View]]) -> Sights:
     """The views of each place as one sight."""
     first = [place[0] for place in places]
-    averaged = [average(np.array([view.corners for view in place], float)) for place in places]
+    averaged = [average(np.array([view.corners for view in p], float), p[0].enlarged) for p in places]
+    looking = [_mean(np.array([view.camera.rotation for view in place])) for place in places]
     return Sights(
         rays=np.array([v.lens.rays(c) for v, (c, _) in zip(first, averaged, strict=True)]).reshape(-1, 4, 2),
-        rotation=np.array([_mean(np.array([v.camera.rotation for v in p])) for p in places]).reshape(-1, 3, 3),
+        rotation=np.array(looking).reshape(-1, 3, 3),
         lens_at=np.array([v.camera.translation for v in first]).reshape(-1, 3),
         size=np.array([v.size_m for v in first], float),
         noise=np.array([n / v.lens.focal for v, (_, n) in zip(first, averaged, strict=True)], float),
-        angle_noise=np.radians([v.angle_noise_deg for v in first]),
+        swing=np.array([_swing(v, turned) for v, turned in zip(first, looking, strict=True)]).reshape(-1, 3, 3),
         focal_doubt=np.array([v.focal_doubt for v in first], float),
     )
 
 
-def average(corners: Array) -> tuple[Array, float]:
-    """The corners (4, 2) of k frames (k, 4, 2), frames that are off weighing less; and their noise per axis, pixels."""
+def _swing(view: View, rotation: Array) -> Array:
+    """Turns of the camera by which it may look beside its reading: a square root of their covariance."""
+    axes = rotation.T if view.axes is None else rotation.T @ view.axes.T
+    covariance = np.radians(view.angle_noise_deg) ** 2 * axes @ axes.T + np.radians(view.aside_deg) ** 2 * np.eye(3)
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)), float)
+
+
+def average(corners: Array, enlarged: float = 1.0) -> tuple[Array, float]:
+    """The corners (4, 2) of k frames (k, 4, 2), frames that are off weighing less; and their noise per axis, pixels.
+
+    Of a picture that was `enlarged` so many times the noise is larger too.
+    """
     frames = len(corners)
     centre = np.median(corners, axis=0)
     weights = np.ones(frames)
     for _ in range(WEIGHINGS if frames > 2 else 0):
         off = np.sqrt(((corners - centre) ** 2).mean(axis=(1, 2)))
-        usual = max(float(np.median(off)), RANDOM_PX)
+        usual = max(float(np.median(off)), RANDOM_PX * enlarged)
         weights = np.minimum(1.0, HUBER * usual / np.maximum(off, 1e-9))
         centre = np.einsum("k,kij->ij", weights, corners) / weights.sum()
     if frames == 2:
         centre = corners.mean(axis=0)
     squares = float((weights[:, None, None] * (corners - centre) ** 2).sum())
-    random = (KNOWN_FROM * RANDOM_PX**2 + squares) / (KNOWN_FROM + 8 * (frames - 1))
+    random = (KNOWN_FROM * (RANDOM_PX * enlarged) ** 2 + squares) / (KNOWN_FROM + 8 * (frames - 1))
     side = float(np.linalg.norm(centre[0] - centre[2])) / sqrt(2)
-    fixed = FIXED_PX**2 + FIXED_SHARE**2 * random + (FIXED_SIDES * side) ** 2
+    fixed = (FIXED_PX * enlarged) ** 2 + FIXED_SHARE**2 * random + (FIXED_SIDES * side) ** 2
     return centre, sqrt(random / float(weights.sum()) + fixed)
 
 

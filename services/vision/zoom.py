@@ -40,6 +40,8 @@ TUKEY, REWEIGHTINGS = 4.685, 15
 RAYLEIGH_MEDIAN = 1.1774  # of a distance in the plane, in standard deviations of a coordinate
 FLOOR_PX = 0.02  # scatter of the points below which none counts as an outlier
 TOGETHER = 4.0  # points are not independent, neighbours err together: as if there were so many times fewer
+LEVER = 0.25  # of the width: the points' own middle is mostly as near to that of the picture
+MIDDLE_PX = 0.02  # how well the middle is known at best
 SYSTEMATIC = 0.0002  # share of the magnification: interpolation, JPEG, the camera's own resize
 
 
@@ -47,13 +49,15 @@ SYSTEMATIC = 0.0002  # share of the magnification: interpolation, JPEG, the came
 class Magnification:
     """`times` larger than at the widest zoom, with its standard deviation `sigma`.
 
-    `right`, `down`: where the middle of the widest picture is in the zoomed one, off its middle as shares of the width.
+    `right`, `down`: where the middle of the widest picture is in the zoomed one, off its middle as shares of the width;
+    `aside` is the standard deviation of either.
     """
 
     times: float
     sigma: float
     right: float = 0.0
     down: float = 0.0
+    aside: float = 0.0
 
     @property
     def relative(self) -> float:
@@ -118,7 +122,7 @@ def measure(wide: Picture, zoomed: Picture, between: tuple[float, float] = (1.0,
         if len(here) < FEWEST or spread < LEAST_SPREAD * width or weights.sum() < FEWEST:
             raise ValueError("the zoomed picture and the wide one have too little in common")
     sigma = scatter * sqrt(TOGETHER / weights.sum()) / spread
-    return _checked(sure, hypot(sigma, SYSTEMATIC), width, height)
+    return _checked(sure, sigma, width, height)
 
 
 def by_marker(wide: Array, zoomed: Array, noise_px: tuple[float, float], width: int, height: int) -> Magnification:
@@ -129,18 +133,19 @@ def by_marker(wide: Array, zoomed: Array, noise_px: tuple[float, float], width: 
     similar, _, weights = _similarity(np.asarray(wide, float), np.asarray(zoomed, float), np.inf)
     noise = hypot(noise_px[0] * _times(similar), noise_px[1])
     sigma = noise / (_spread(np.asarray(zoomed, float), weights) * sqrt(len(wide)))
-    return _checked(similar, hypot(sigma, SYSTEMATIC), width, height)
+    return _checked(similar, sigma, width, height)
 
 
-def _checked(similar: Array, relative: float, width: int, height: int) -> Magnification:
-    """The similarity as a magnification; ValueError when no zoom does that."""
+def _checked(similar: Array, scatter: float, width: int, height: int) -> Magnification:
+    """The similarity as a magnification, unsure by such a share; ValueError when no zoom does that."""
     times = _times(similar)
     middle = np.array([(width - 1) / 2, (height - 1) / 2])
     right, down = (similar[:, :2] @ middle + similar[:, 2] - middle) / width
     turned = abs(degrees(atan2(similar[1, 0], similar[0, 0])))
-    if turned > ROTATED_DEG + degrees(3 * relative) or hypot(right, down) > ASIDE * times:
+    if turned > ROTATED_DEG + degrees(3 * scatter) or hypot(right, down) > ASIDE * times:
         raise ValueError(f"no zoom turns the picture by {turned:.1f} degrees and moves it by {hypot(right, down):.0%}")
-    return Magnification(times, times * relative, float(right), float(down))
+    sigma = times * hypot(scatter, SYSTEMATIC)
+    return Magnification(times, sigma, float(right), float(down), LEVER * scatter + MIDDLE_PX / width)
 
 
 def _times(similar: Array) -> float:
@@ -173,9 +178,10 @@ def _coarse(wide: Picture, zoomed: Picture, between: tuple[float, float]) -> Arr
     low = round(COARSE_PX * height / width)
     around = ((ROOM_PX, ROOM_PX), (ROOM_PX, ROOM_PX))
     small = np.pad(_evened(_resized(wide, COARSE_PX, low)), around, constant_values=128)
+    medium = _resized(zoomed, 2 * COARSE_PX, 2 * low)  # shrinking the large one again and again is what takes time
     likest = (LIKE, 0.0, 0, 0)
     for times in between[0] * STEP ** np.arange(ceil(log(between[1] / between[0]) / log(STEP)) + 1):
-        part = _evened(_resized(zoomed, round(COARSE_PX / times), round(low / times)))
+        part = _evened(_resized(medium, round(COARSE_PX / times), round(low / times)))
         _, like, _, (x, y) = cv2.minMaxLoc(cv2.matchTemplate(small, part, cv2.TM_CCOEFF_NORMED))
         likest = max(likest, (like, COARSE_PX / part.shape[1], x - ROOM_PX, y - ROOM_PX))
     _, times, x, y = likest

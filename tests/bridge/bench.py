@@ -20,11 +20,16 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from services.client import connected
+from services.config import BusSettings
 from services.peers import Missing, end, mosquitto, ros
+from tests.bridge import patterns
 from tests.bridge.conftest import ROOT
+from tests.bridge.test_pictures import IMAGE, listening
 
 MESSAGES, PACED, RATE = 20_000, 5_000, 1000.0
 TRIPS, TRIP_RATE = 1_000, 100.0
+PICTURES, PICTURES_FPS = 150, 15.0
 ITEMS = [f"Number_{index}" for index in range(200)]
 STATES = [f"home/{item}/state" for item in ITEMS]
 RULES = """
@@ -139,7 +144,13 @@ def lab() -> Iterator[Lab]:
         items = {item: {"type": "Number", "label": item} for item in ITEMS}
         (folder / "home.yaml").write_text(json.dumps({"items": items}))
         (folder / "bridge.yaml").write_text((ROOT / "config" / "bridge.yaml").read_text() + RULES)
-        config = {"bus": {"port": broker.port}, "state": str(folder / "state"), "home": "home.yaml", "bridge": {}}
+        config = {
+            "bus": {"port": broker.port},
+            "state": str(folder / "state"),
+            "home": "home.yaml",
+            "bridge": {},
+            "cameras": {"ip1": {"url": "http://127.0.0.1:9"}},
+        }
         (folder / "apartment.yaml").write_text(json.dumps(config))
         yield Lab(broker.port, {**os.environ, **master.env, "PYTHONPATH": str(ROOT)}, folder, brokers, master)
 
@@ -181,7 +192,9 @@ def rows(messages: int = MESSAGES, paced: int = PACED, trips: int = TRIPS) -> It
         yield Row("round trip at 100 Hz, p99", "ms", trip["p99"], None, "", "<= 5 ms")
         with here.part("newcomer", started=True, topic="/iot_updates", count=len(ITEMS)) as part:
             late = part.result()
-        yield Row("200 items for a newcomer", "ms", late["snapshot"], None, "", "<= 50 ms")
+        yield Row("200 items, from the first to the last", "ms", late["snapshot"], None, "", "<= 50 ms")
+        yield Row("200 items, from the newcomer's beginning", "ms", late["whole"], None, "", "")
+        yield from _pictures(here)
 
 
 def _both(here: Lab, messages: int, paced: int) -> Iterator[Row]:
@@ -203,6 +216,22 @@ def _both(here: Lab, messages: int, paced: int) -> Iterator[Row]:
         loop, ours = (_whole(to_mqtt(here, qos, messages, 0, through), messages) for through in ("loop", "bridge"))
         text = f"ROS to MQTT, QoS {qos}, flat out"
         yield Row(text, "msg/s", ours["rate"], loop["rate"], "a bare loop", ">= 0.9 x" if qos else "")
+
+
+def _pictures(here: Lab) -> Iterator[Row]:
+    """What the bridge adds to the stream, by the number that each picture shows."""
+    with (
+        patterns.stream(PICTURES_FPS) as stream,
+        connected(BusSettings(port=here.port)) as bus,
+        listening(here.master, IMAGE) as ear,
+    ):
+        bus.say("camera/ip1/stream", json.dumps({"rtsp": True, "mjpeg": False, "url": stream.url}))
+        images = ear.wait_for(IMAGE, PICTURES)[20:]
+    added = sorted(1000 * (one["at"] - stream.put[one["number"]]) for one in images)
+    for name, share in (("p50", 0.5), ("p99", 0.99)):
+        yield Row(f"a picture on its way, {name}", "ms", added[int(share * len(added))], None, "", "<= 150 ms")
+    rate = (len(images) - 1) / (images[-1]["at"] - images[0]["at"])
+    yield Row("pictures on image_raw", "1/s", rate, PICTURES_FPS, "the stream", "1 x")
 
 
 def _whole(figures: dict[str, float], count: int) -> dict[str, float]:

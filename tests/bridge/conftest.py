@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -85,18 +86,27 @@ def master(tmp_path: Path) -> Iterator[ros.Master]:
         pytest.skip(str(missing))
 
 
-@pytest.fixture
-def run_bridge() -> Iterator[Callable[..., BridgeProcess]]:
-    """Starts bridges, and ends them with the test."""
+@contextmanager
+def bridges() -> Iterator[Callable[..., BridgeProcess]]:
+    """Starts bridges, and ends them with the block."""
     started: list[BridgeProcess] = []
 
     def run(env: dict[str, str], items: dict[str, Any], **config: Any) -> BridgeProcess:
         started.append(BridgeProcess(env, items, **config))
         return started[-1]
 
-    yield run
-    for bridge in started:
-        peers.end(bridge.process)
-        for pipe in (bridge.process.stdin, bridge.process.stdout):
-            assert pipe
-            pipe.close()
+    try:
+        yield run
+    finally:
+        for bridge in started:
+            peers.end(bridge.process)
+            for pipe in (bridge.process.stdin, bridge.process.stdout):
+                assert pipe
+                pipe.close()
+
+
+@pytest.fixture
+def run_bridge() -> Iterator[Callable[..., BridgeProcess]]:
+    """Starts bridges, and ends them with the test."""
+    with bridges() as run:
+        yield run

@@ -38,6 +38,8 @@ def heard(message: Any, topic: str) -> None:
         told |= {"format": message.format, "digest": hashlib.sha256(message.data).hexdigest()}
     elif hasattr(message, "K"):
         told |= {"size": [message.width, message.height], "K": list(message.K), "D": list(message.D)}
+    elif hasattr(message, "info"):
+        told["cells"] = list(message.data)
     elif hasattr(message, "status"):
         told["levels"] = {one.name: one.level for one in message.status}
         told["status"] = {one.name: {pair.key: pair.value for pair in one.values} for one in message.status}

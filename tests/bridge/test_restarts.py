@@ -11,10 +11,12 @@ import signal
 import subprocess
 import sys
 import time
+import xmlrpc.client
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -83,6 +85,12 @@ def running(folder: Path, master: ros.Master) -> Iterator[Flat]:
         yield flat
 
 
+def parameter(master: ros.Master, name: str) -> Any:
+    """What the master has under that name."""
+    with xmlrpc.client.ServerProxy(master.uri) as proxy:
+        return proxy.getParam("/test", name)[2]  # type: ignore[index]
+
+
 def everything_works(flat: Flat, since: float, kept: dict[str, str], news: tuple[str, str]) -> None:
     """A new echo hears what is kept and then the news, a new word arrives, a service answers."""
     filters = ["home/+/command", "camera/+/snapshot/get", "service/bridge/status"]
@@ -90,6 +98,7 @@ def everything_works(flat: Flat, since: float, kept: dict[str, str], news: tuple
         bus = stack.enter_context(connected(BusSettings(port=flat.port), filters))
         bus.payload("service/bridge/status", lambda text: text == "online", PATIENCE_S)
         wait_until(lambda: publishers(flat.master, "/iot_updates") == ["/iot_bridge"], "registered", PATIENCE_S)
+        wait_until(lambda: parameter(flat.master, "/iot_bridge/cameras") == ["ip1"], "its parameters", PATIENCE_S)
         assert time.monotonic() - since < BACK_S, "broker and master know the bridge again"
         echo = stack.enter_context(flat.tool("rostopic", "echo", "-n", f"{len(kept) + 1}", "/iot_updates"))
         word = ("rostopic", "pub", "-1", "/iot_command", "diagnostic_msgs/KeyValue", "{key: Hall_Dimmer, value: '30'}")

@@ -90,8 +90,8 @@ def test_a_camera_that_takes_another_topics_name_is_told(tmp_path: Path) -> None
     text = GOOD.replace("ros: a", "ros: ip2/a") + (
         "- {direction: to_ros, each: camera, mqtt: 'camera/{cam}/position', ros: a, type: geometry_msgs/Point}\n"
     )
-    (fault,) = faults(tmp_path, text, ("ip1", "ip2"))
-    assert "expected type" in fault
+    wrong_type, _ = faults(tmp_path, text, ("ip1", "ip2"))
+    assert "expected type" in wrong_type
 
 
 @pytest.mark.parametrize("text", ["", "rules: 3", "rule: []", "rules: []\nmore: 1", "rules: [", "rules: [3]"])

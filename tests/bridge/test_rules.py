@@ -190,3 +190,19 @@ def test_filter_and_pattern_agree(mqtt: str) -> None:
     made = rule(UPDATES, mqtt=mqtt, fields={})
     for topic in ("home/x/state", "home/state", "my/a/b", "my/a/b/c/d", "my/topic", "my/topic/x"):
         assert topic_matches(made.filter, topic) == bool(made.pattern.fullmatch(topic)), topic
+
+
+@pytest.mark.parametrize(
+    ("changes", "latched"),
+    [
+        ({"mqtt": "camera/{cam}/position"}, True),
+        ({"mqtt": "camera/{cam}/marker/{marker}"}, True),
+        ({"mqtt": "camera/{cam}/scan/result"}, False),
+        ({"mqtt": "home/{item}/state", "replay": True}, False),
+        ({"mqtt": "lab/{bench}"}, False),
+        ({"mqtt": "lab/{bench}", "latch": True}, True),
+        ({"mqtt": "camera/{cam}/position", "latch": False}, False),
+    ],
+)
+def test_what_is_retained_on_mqtt_is_latched_on_ros(changes: Any, latched: bool) -> None:
+    assert rule(UPDATES, fields={}, **changes).latches is latched

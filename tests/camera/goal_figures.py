@@ -12,7 +12,7 @@ import httpx
 
 from services.simulators.camera.firmwares import PROFILES
 from tests import bounds
-from tests.camera.goals import LIMITS, START, Outcome, Rig, constants, outcomes, positions, random_goals
+from tests.camera.goals import LIMITS, START, Outcome, Rig, constants, outcomes, random_goals, wanted, with_presets
 from tests.camera.least_time import least_time
 from tests.camera.report_controller import ReportController
 
@@ -43,13 +43,19 @@ def rows() -> list[Row]:
     """Every firmware, and the report's controller on one of them."""
     goals = random_goals(bounds.GOALS, SEED)
     found = {name: outcomes(profile, goals, SEED) for name, profile in PROFILES.items()}
-    bound = {
-        name: bounds.MEDIAN_POSITIONS if positions(profile) else bounds.MEDIAN_START_STOP
-        for name, profile in PROFILES.items()
-    }
+    bound = {name: wanted(profile) for name, profile in PROFILES.items()}
     ours = [_row(name, one, bound[name]) for name, one in found.items()]
     few = _row(f"{COMPARED}, the first {THE_REPORT_S_GOALS}", found[COMPARED][:THE_REPORT_S_GOALS], bound[COMPARED])
-    return [*ours, few, _row(f"{COMPARED}, the report's controller", the_report_s(), None)]
+    return [*ours, *_presets(goals), few, _row(f"{COMPARED}, the report's controller", the_report_s(), None)]
+
+
+def _presets(goals: list[tuple[float, float, float]]) -> list[Row]:
+    """Where a preset is at the goal, and where one lies beside it."""
+    beside = {0.25: bounds.MEDIAN_POSITIONS, bounds.PRESET_DEG: bounds.MEDIAN_BESIDE}
+    return [
+        _row(f"{COMPARED}, preset within {far:g} deg", with_presets(PROFILES[COMPARED], goals, SEED, far), bound)
+        for far, bound in beside.items()
+    ]
 
 
 def the_report_s() -> list[Outcome]:

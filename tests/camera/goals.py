@@ -26,10 +26,12 @@ from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, realm
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.latency import Latency
+from services.simulators.camera.motors import Pose
 from services.simulators.camera.profiles import Profile
 from services.simulators.camera.program import Inside
 from services.simulators.world import load
 from services.virtual.wire import Wire
+from tests import bounds
 from tests.camera.least_time import Constants, least_time
 
 WORLD = Path(__file__).parents[2] / "config" / "world.yaml"
@@ -187,9 +189,30 @@ def outcomes(profile: Profile, goals: Iterable[Goal], seed: int = 1) -> list[Out
     return found
 
 
+def with_presets(profile: Profile, goals: Iterable[Goal], seed: int, beside: float) -> list[Outcome]:
+    """The same where each goal has a preset near it, known from a place, and never gone to before."""
+    rig, found, rng = Rig(profile, seed), [], random.Random(seed)
+    for goal in goals:
+        low, high = (187.0, 359.9) if goal[0] > 180.0 else (0.0, 178.5)
+        pan = min(high, max(low, goal[0] + rng.uniform(-beside, beside)))
+        near = (round(pan, 1), round(min(107.5, max(-9.5, goal[1] + rng.uniform(-beside, beside))), 1), goal[2])
+        rig.device.ptz.presets[1] = ("near", Pose(*near))
+        rig.skill.presets.clear()
+        found.append(rig.go(goal, presets={1: near}))
+        rig.now += 1.0
+    return found
+
+
 def named() -> dict[str, Profile]:
     """Every profile that the simulator has."""
     return {name: replace(profile) for name, profile in PROFILES.items()}
+
+
+def wanted(profile: Profile) -> float:
+    """The bound of the median of time over least time."""
+    if profile.position_abs == "pan-only":
+        return bounds.MEDIAN_PAN_ONLY
+    return bounds.MEDIAN_POSITIONS if positions(profile) else bounds.MEDIAN_START_STOP
 
 
 def positions(profile: Profile) -> bool:

@@ -418,7 +418,7 @@ def test_a_lens_calibration_looks_at_pictures_meanwhile_and_a_stop_ends_it(here:
 
 
 def test_every_order_is_tried() -> None:
-    in_virtual_time = {"CalibratePtz", "CalibrateLens", "CalibrateMount", "SetCameraInfo"}
+    in_virtual_time = {"CalibratePtz", "CalibrateLens", "CalibrateMount", "CalibrateZoom", "SetCameraInfo"}
     tried = {case.key for case in CASES} | in_virtual_time
     assert tried == {name for name, _ in orders.KEYS.values()} | {"Position"}
 

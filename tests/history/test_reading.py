@@ -10,7 +10,7 @@ import pytest
 from services.history.answers import answer
 from services.payloads import HistoryGet, stamp
 from services.storage import Batch, Item, Sample, Storage, open_storage, reading
-from tests.databases import Database
+from tests.databases import Database, fresh_mariadb, fresh_sqlite
 from tests.storage import day
 from tests.storage.day import at
 from tests.storage.test_queries import play_the_day
@@ -23,8 +23,22 @@ def us(clock: str) -> int:
     return round(at(clock) * US)
 
 
+@pytest.fixture(scope="module", params=["sqlite", pytest.param("mariadb", marks=pytest.mark.mariadb)])
+def storage(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Storage]:
+    """The day, for questions that change nothing."""
+    if request.param == "sqlite":
+        played: Database = fresh_sqlite(tmp_path_factory.mktemp("day"))
+    else:
+        played = fresh_mariadb(request.getfixturevalue("mariadb_server"))
+    play_the_day(played)
+    opened = open_storage(played.address)
+    yield opened
+    opened.close()
+
+
 @pytest.fixture
-def storage(database: Database) -> Iterator[Storage]:
+def own_storage(database: Database) -> Iterator[Storage]:
+    """The day once more, for one test alone."""
     play_the_day(database)
     opened = open_storage(database.address)
     yield opened
@@ -91,27 +105,6 @@ def test_buckets_leave_out_what_is_no_number_and_empty_ones(storage: Storage) ->
     ]  # fmt: skip
 
 
-def test_kept_means_and_raw_rows_make_one_row_of_buckets(storage: Storage) -> None:
-    """As after the job of `keeping.py`: the first two hours are means of 300 s, their samples are gone."""
-    lab = storage.items["Lab_Temp"]
-    whole = reading.buckets(storage, lab, us("05:00"), us("10:00"), 3600)
-    early = storage.samples("Lab_Temp", until=us("07:00"))
-    values = ",".join(f"({lab.item_id},300,{s.time // US},1,{s.num},{s.num},{s.num},{s.num})" for s in early)
-    storage.change(f"INSERT INTO summary VALUES {values}")
-    sql = reading.DIALECTS[storage.dialect]
-    storage.change(f"DELETE FROM sample WHERE item_id={lab.item_id} AND time<{sql.at(us('07:00'))}")
-    assert reading.buckets(storage, lab, us("05:00"), us("10:00"), 3600) == whole
-    assert reading.buckets(storage, lab, us("05:00"), us("10:00"), 700)[0].start > us("06:30")  # 300 does not divide it
-
-
-def test_an_item_that_another_process_made_is_found(storage: Storage, database: Database) -> None:
-    other = open_storage(database.address)
-    other.add_items([Item("New", "Number", "W")])
-    other.write(Batch([Sample("New", us("09:00"), 5.0, None)]))
-    other.close()
-    assert ask(storage, item="New", what="last").samples == [(stamp(at("09:00")), 5.0)]
-
-
 def test_the_newest_samples_of_a_span_come_oldest_first(storage: Storage) -> None:
     reply = ask(storage, item="Lab_Temp", since=stamp(at("06:30")), until=stamp(at("09:00")), limit=2)
     assert reply.samples == [(stamp(at("08:00")), 22.0), ("2026-01-31T08:30:00.250Z", 21.0)]
@@ -154,3 +147,25 @@ def test_a_question_without_an_answer_is_told_why(storage: Storage, question: di
     reply = answer(storage, HistoryGet.model_validate({"id": "q", **question}), NOW)
     assert reply.samples == []
     assert told in (reply.error or "")
+
+
+def test_kept_means_and_raw_rows_make_one_row_of_buckets(own_storage: Storage) -> None:
+    """As after the job of `keeping.py`: the first two hours are means of 300 s, their samples are gone."""
+    storage = own_storage
+    lab = storage.items["Lab_Temp"]
+    whole = reading.buckets(storage, lab, us("05:00"), us("10:00"), 3600)
+    early = storage.samples("Lab_Temp", until=us("07:00"))
+    values = ",".join(f"({lab.item_id},300,{s.time // US},1,{s.num},{s.num},{s.num},{s.num})" for s in early)
+    storage.change(f"INSERT INTO summary VALUES {values}")
+    sql = reading.DIALECTS[storage.dialect]
+    storage.change(f"DELETE FROM sample WHERE item_id={lab.item_id} AND time<{sql.at(us('07:00'))}")
+    assert reading.buckets(storage, lab, us("05:00"), us("10:00"), 3600) == whole
+    assert reading.buckets(storage, lab, us("05:00"), us("10:00"), 700)[0].start > us("06:30")  # 300 does not divide it
+
+
+def test_an_item_that_another_process_made_is_found(own_storage: Storage, database: Database) -> None:
+    other = open_storage(database.address)
+    other.add_items([Item("New", "Number", "W")])
+    other.write(Batch([Sample("New", us("09:00"), 5.0, None)]))
+    other.close()
+    assert ask(own_storage, item="New", what="last").samples == [(stamp(at("09:00")), 5.0)]

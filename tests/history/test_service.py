@@ -11,6 +11,7 @@ from services.bus import Message
 from services.errors import Unavailable
 from services.history import Config, start
 from services.history.service import History
+from services.home import Home
 from services.storage import Batch, Item, Sample, open_storage
 from services.topics import HISTORY_GET, LateCommand
 from tests.storage.day import at
@@ -27,7 +28,7 @@ def filled(folder: Path) -> Config:
     storage.add_items([Item("Note", "String")])
     storage.write(Batch([Sample("Note", round(at("07:00") * 1e6) + n, None, f"{n} " + "ä" * 1000) for n in range(300)]))
     storage.close()
-    return Config(url="sqlite:///bus.db", folder=folder)
+    return Config(url="sqlite:///bus.db", folder=folder, home=Home(items={}))
 
 
 def test_a_question_is_answered_on_its_own_topic_and_where_it_asks_for_it(tmp_path: Path) -> None:

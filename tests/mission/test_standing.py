@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services import floor
+from services import floor, robot_places
 from services.errors import ConfigError
 from services.floor import FREE, OCCUPIED, UNKNOWN, Grid
 from services.mission.standing import Pose, body, stands
@@ -105,25 +105,12 @@ def test_a_map_is_written_and_read_as_map_server_does(tmp_path: Path) -> None:
     assert (top == 0).all()  # the picture's first row is the wall at the highest y
 
 
-@pytest.mark.parametrize(
-    ("text", "fault"),
-    [
-        ("image: map.pgm\norigin: [0, 0, 0]\n", "'resolution'"),
-        ("image: none.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n", "none.pgm"),
-        ("image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0.5]\n", "turned"),
-        ("image: text.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n", "binary PGM"),
-        ("- 1\n", "something else"),
-    ],
-)
-def test_what_is_no_map_is_told_with_the_file(tmp_path: Path, text: str, fault: str) -> None:
-    floor.write(room([]), tmp_path / "good.yaml")
-    (tmp_path / "good.pgm").rename(tmp_path / "map.pgm")
-    (tmp_path / "text.pgm").write_text("P2\n1 1\n255\n0\n")
-    (tmp_path / "map.yaml").write_text(text)
-    with pytest.raises(ConfigError) as told:
-        floor.read(tmp_path / "map.yaml")
-    assert fault in told.value.faults[0]
-    assert "map.yaml:1" in told.value.faults[0]
+def test_a_map_that_is_turned_is_no_map_for_a_robot(tmp_path: Path) -> None:
+    floor.write(room([]), tmp_path / "map.yaml")
+    (tmp_path / "map.yaml").write_text((tmp_path / "map.yaml").read_text().replace("-2.0, 0.0]", "-2.0, 0.5]"))
+    (tmp_path / "robot_places.yaml").write_text("map: map.yaml\n")
+    with pytest.raises(ConfigError, match=r"robot_places.yaml:1: map: expected a map that is not turned"):
+        robot_places.read(tmp_path / "robot_places.yaml")
 
 
 def test_the_map_that_is_shipped_is_that_of_the_simulated_flat() -> None:

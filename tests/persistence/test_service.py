@@ -58,11 +58,12 @@ def running(database: Database, home: Home = HOME) -> Iterator[Persistence]:
 
 
 def turn(service: Persistence, *messages: Message, now: float | None = None) -> list[Message]:
-    """A turn of the runner; what it published."""
+    """A turn of the runner; what it published, but for its health."""
     said: list[Message] = []
     for message in messages:
         said += service.handle(message, message.received)
-    return said + list(service.tick(now if now is not None else messages[-1].received if messages else T))
+    said += service.tick(now if now is not None else messages[-1].received if messages else T)
+    return [one for one in said if not one.topic.startswith("diagnostics/")]
 
 
 def stored(database: Database, item: str) -> list[tuple[float, float | None, str | None]]:

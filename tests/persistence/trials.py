@@ -16,7 +16,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -52,6 +52,11 @@ class Publisher:
     def __exit__(self, *_: object) -> None:
         self._stop.set()
         self._thread.join(10)
+
+    def go_on(self, messages: float) -> None:
+        """Returns when so many more are said."""
+        wanted = self.said + messages
+        peers.wait_until(lambda: self.said >= wanted, f"{messages:.0f} more messages", DRAINED_S)
 
     def _run(self) -> None:
         while not self._stop.is_set():
@@ -174,57 +179,58 @@ def site(folder: Path) -> Iterator[Site]:
 
 def _is_heard(one: Site) -> bool:
     """Whether what is said is stored: before the first subscription nobody is owed anything."""
-    with Publisher(one.broker.port):
-        time.sleep(0.1)
+    with Publisher(one.broker.port) as publisher:
+        publisher.go_on(BURST)
     return bool(one.rows(0.0))
 
 
-def kill_writer(one: Site, rng: random.Random) -> None:
+def kill_writer(one: Site, publisher: Publisher, rng: random.Random) -> None:
     """kill -9 between any two of its instructions, and the next one starts."""
     one.kill_writer()
     one.start_writer()
 
 
-def kill_database(one: Site, rng: random.Random) -> None:
+def kill_database(one: Site, publisher: Publisher, rng: random.Random) -> None:
     """kill -9 of MariaDB; it recovers from its log."""
     one.kill_database()
-    time.sleep(rng.uniform(0, 0.5))
+    publisher.go_on(rng.uniform(0, RATE / 2))
     one.start_database()
 
 
-def restart_broker(one: Site, rng: random.Random) -> None:
+def restart_broker(one: Site, publisher: Publisher, rng: random.Random) -> None:
     """mosquitto is stopped as the system does it, and started."""
     one.stop_broker()
-    time.sleep(rng.uniform(0, 0.5))
     one.start_broker()
 
 
-def pull_network(one: Site, rng: random.Random) -> None:
+def pull_network(one: Site, publisher: Publisher, rng: random.Random) -> None:
     """The writer's cable to the broker, until after its keep-alive or before."""
     one.link.cut()
-    time.sleep(rng.uniform(0.2, 3.0))
+    publisher.go_on(rng.uniform(0.2, 3.0) * RATE)
     one.link.mend()
 
 
-TROUBLES: tuple[Callable[[Site, random.Random], None], ...] = (kill_writer, kill_database, restart_broker, pull_network)
+Trouble = Callable[[Site, Publisher, random.Random], None]
+TROUBLES: tuple[Trouble, ...] = (kill_writer, kill_database, restart_broker, pull_network)
 
 
-def trouble(one: Site, rng: random.Random, what: Callable[[Site, random.Random], None] | None = None) -> int:
+def trouble(one: Site, rng: random.Random, what: Trouble | None = None) -> int:
     """One trial: messages come, something happens at a random moment, messages go on; then everything is counted."""
     what = what or rng.choice(TROUBLES)
     began = time.time()
     with Publisher(one.broker.port) as publisher:
-        time.sleep(rng.uniform(0.3, 1.5))
-        what(one, rng)
-        time.sleep(rng.uniform(0.3, 1.0))
+        publisher.go_on(rng.uniform(0.3, 1.5) * RATE)
+        what(one, publisher, rng)
+        publisher.go_on(rng.uniform(0.3, 1.0) * RATE)
     lost, rows = _drained(one, began, publisher.acknowledged)
-    assert not lost, f"{what.__name__}: {len(lost)} of {len(publisher.acknowledged)} lost: {sorted(lost)[:10]}"
+    name = getattr(what, "__name__", "trouble")
+    assert not lost, f"{name}: {len(lost)} of {len(publisher.acknowledged)} lost: {sorted(lost)[:10]}"
     counted = Counter(number for _, number in rows)
     doubled = [number for number, times in counted.items() if times > 1]
-    assert not doubled, f"{what.__name__}: {len(doubled)} doubled: {sorted(doubled)[:10]}"
+    assert not doubled, f"{name}: {len(doubled)} doubled: {sorted(doubled)[:10]}"
     last: dict[str, int] = {}
     for item, number in rows:
-        assert number > last.get(item, -1), f"{what.__name__}: {item}: {number} behind {last[item]}"
+        assert number > last.get(item, -1), f"{name}: {item}: {number} behind {last[item]}"
         last[item] = number
     assert len(publisher.acknowledged) > RATE / 4
     return len(publisher.acknowledged)
@@ -232,44 +238,37 @@ def trouble(one: Site, rng: random.Random, what: Callable[[Site, random.Random],
 
 def _drained(one: Site, since: float, acknowledged: set[int]) -> tuple[set[int], list[tuple[str, int]]]:
     """What is missing in the end, and all rows; waits for what is still on its way."""
-    end = time.monotonic() + DRAINED_S
-    while True:
-        try:
-            rows = one.rows(since - 0.001)
-        except Unavailable:
-            rows = []
-        missing = acknowledged - {number for _, number in rows}
-        if not missing or time.monotonic() > end:
-            return missing, rows
-        time.sleep(0.2)
+    found: list[list[tuple[str, int]]] = [[]]
+
+    def complete() -> bool:
+        with suppress(Unavailable):
+            found[0] = one.rows(since - 0.001)
+        return not acknowledged - {number for _, number in found[0]}
+
+    with suppress(TimeoutError):
+        peers.wait_until(complete, "every row", DRAINED_S)
+    return acknowledged - {number for _, number in found[0]}, found[0]
 
 
 def kill_broker(one: Site, rng: random.Random, *, backlog: bool) -> tuple[int, int, int]:
     """kill -9 of mosquitto, whose saving is not tied to its acknowledgements: acknowledged, lost, doubled.
 
-    With `backlog` the writer has been away for a second before.
+    With `backlog` the writer has been away for a second before. What is said last comes after all that is lost.
     """
     began = time.time()
     with Publisher(one.broker.port) as publisher:
-        time.sleep(rng.uniform(0.5, 1.5))
+        publisher.go_on(rng.uniform(0.5, 1.5) * RATE)
         if backlog:
             one.kill_writer()
-            time.sleep(1.0)
+            publisher.go_on(RATE)
         os.kill(one.broker.pid, signal.SIGKILL)
         one.stop_broker()
         one.start_broker()
         if backlog:
             one.start_writer()
-        time.sleep(rng.uniform(0.5, 1.0))
-    peers.wait_until(lambda: _still(one, began), "the rows to be complete", 60.0)
-    rows = one.rows(began - 0.001)
-    counted = Counter(number for _, number in rows)
+        publisher.go_on(RATE)
+    newest = max(publisher.acknowledged)
+    peers.wait_until(lambda: newest in {n for _, n in one.rows(began - 0.001)}, "the last message", DRAINED_S)
+    counted = Counter(number for _, number in one.rows(began - 0.001))
     lost = len(publisher.acknowledged - set(counted))
     return len(publisher.acknowledged), lost, sum(times - 1 for times in counted.values())
-
-
-def _still(one: Site, since: float) -> bool:
-    """Whether no row has come for a while."""
-    before = len(one.rows(since))
-    time.sleep(1.5)
-    return len(one.rows(since)) == before

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import random
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import degrees
 
@@ -12,7 +15,8 @@ from numpy.typing import NDArray
 from services.vision.calibrate_mount import MountFit, fit
 from services.vision.frames import Mount, Transform, camera_in_apartment, rotation_x, rotation_z
 from services.vision.mount_squares import SQUARE, Known, Look
-from tests.vision.lens_trials import PLAIN
+from tests import bounds
+from tests.vision.lens_trials import PLAIN, lens_trial
 
 Array = NDArray[np.float64]
 SIZE_M = 0.14
@@ -132,3 +136,17 @@ def mount_trial(rng: np.random.Generator, count: int = 5) -> MountTrial:
     markers = spread(rng, truth, count)
     found = fit(looks_at(truth, markers, rng), placed(rng, markers), Mount((0.0, 0.0, 0.0), "ceiling", **ARMS))
     return judged(found, truth)
+
+
+@contextmanager
+def calibrations() -> Iterator[Callable[[random.Random], float]]:
+    """Turns of `make soak`: a lens, held to its bound, and a mount; how far off that is, mm."""
+
+    def turn(rng: random.Random) -> float:
+        dice = np.random.default_rng(rng.getrandbits(64))
+        assert lens_trial(dice).focal_off <= bounds.LENS
+        trial = mount_trial(dice)
+        assert trial.turn_deg <= 3 * bounds.MOUNT_DEG, trial
+        return 1000 * trial.place_m
+
+    yield turn

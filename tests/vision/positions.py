@@ -1,6 +1,7 @@
 """How exact and how honest positions are, over random flats: the trial of the tests and of `make soak`.
 
-Every sighting is placed twice, with exact readings and with noisy ones; a part of them is zoomed.
+Every sighting is placed three times: with exact readings, with noisy ones, and with noisy ones and a mount that was
+calibrated from six markers. A part of them is zoomed.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import random
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from rich.console import Console
@@ -16,15 +18,20 @@ from rich.table import Table
 
 from services.camera.scan.sightings import Eye, Sighting, Sought, results
 from services.payloads import ScanResult
+from services.vision.calibrate_mount import fit
 from services.vision.frames import Array, quaternion
 from tests import bounds
-from tests.vision.sighted import SIZE_M, Flat, Sighted, flat, placed, sighted
+from tests.vision import mount_trials
+from tests.vision.sighted import SIZE_M, Sighted, flat, placed, sighted
 
 MOST_TIMES = 3.0  # the simulated camera's zoom
 NINETY = 6.251  # chi-square of three numbers
 FLIPPED_DEG = 15.0  # an orientation farther off than this is the other one
 PER_SCENE, ZOOMED_PER_SCENE = 32, 8
 INEXACT_DEG = 1e-4  # what "exact" readings are said to be
+MARKERS = 6  # of a mount's calibration
+Readings = Literal["exact", "noisy", "calibrated"]
+READINGS: tuple[Readings, ...] = ("exact", "noisy", "calibrated")
 
 
 @dataclass(frozen=True)
@@ -32,7 +39,7 @@ class Outcome:
     """One sighting and what came of it."""
 
     zoomed: bool
-    noisy: bool
+    readings: Readings
     off_mm: float
     inside: bool
     sure: bool
@@ -76,26 +83,41 @@ class Refusals(list[str]):
 def scene(seed: int, count: int, zoomed: int, refused: Refusals) -> list[Outcome]:
     """The outcomes in one flat: so many wide sightings, and so many zoomed ones."""
     there, rng = flat(seed), np.random.default_rng(seed)
+    noisy = replace(there.eye, angle_noise_deg=bounds.READ_NOISE_DEG)
+    eyes: dict[Readings, Eye] = {
+        "exact": replace(there.eye, angle_noise_deg=INEXACT_DEG),
+        "noisy": noisy,
+        "calibrated": _calibrated(noisy, rng),
+    }
     outcomes = []
     for number in range(count + zoomed):
         times = 1.0 if number < count else rng.uniform(1.1, MOST_TIMES)
         one = sighted(there, placed(there, rng), rng, times=times)
-        for noise in (0.0, bounds.READ_NOISE_DEG):
-            outcome = _outcome(there, one, rng, noise, times, refused)
+        if not one.seen:
+            refused.append(f"not seen: {one.side_px:.0f} px")
+            continue
+        for readings, eye in eyes.items():
+            off = rng.normal(0, 0 if readings == "exact" else bounds.READ_NOISE_DEG, 2)
+            outcome = _outcome(eye, one, off, times, readings, refused)
             if outcome is not None:
                 outcomes.append(outcome)
     return outcomes
 
 
+def _calibrated(eye: Eye, rng: np.random.Generator) -> Eye:
+    """With a mount as its calibration finds it, from markers that were put a centimetre off."""
+    truth = eye.mount
+    assert truth is not None
+    markers = mount_trials.spread(rng, truth, MARKERS)
+    looks = mount_trials.looks_at(truth, markers, rng)
+    found = fit(looks, mount_trials.placed(rng, markers), replace(truth, position=(0.0, 0.0, 0.0), yaw_deg=0.0))
+    return replace(eye, mount=found.mount, mount_doubt=found.covariance[:6, :6])
+
+
 def _outcome(
-    there: Flat, one: Sighted, rng: np.random.Generator, noise: float, times: float, refused: Refusals
+    eye: Eye, one: Sighted, off_deg: Array, times: float, readings: Readings, refused: Refusals
 ) -> Outcome | None:
-    seen = [_misread(sighting, rng.normal(0, noise, 2)) for sighting in one.seen[:1]]
-    seen += [replace(sighting, reading=seen[0].reading) for sighting in one.seen[1:]]
-    if not seen:
-        refused.append(f"not seen: {one.side_px:.0f} px")
-        return None
-    eye: Eye = replace(there.eye, angle_noise_deg=max(noise, INEXACT_DEG))
+    seen = [_misread(sighting, off_deg) for sighting in one.seen]
     (result,) = results(eye, Sought(one.marker.id, SIZE_M), seen, "scan", "color")
     if result.position is None:
         refused.append(str(result.why))
@@ -105,7 +127,7 @@ def _outcome(
     magnified = seen[0].magnified
     return Outcome(
         zoomed=times != 1.0,
-        noisy=noise > 0,
+        readings=readings,
         off_mm=1000 * float(np.linalg.norm(off)),
         inside=surprise < NINETY,
         sure=result.orientation is not None,
@@ -127,10 +149,11 @@ def _turned(result: ScanResult, truly: Array) -> float:
 
 
 def kinds(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
-    """By whether they are zoomed and their readings noisy."""
-    names = {(z, n): f"{'zoomed' if z else 'wide'}, {'noisy' if n else 'exact'}" for z in (0, 1) for n in (0, 1)}
-    sorted_ = {name: [o for o in outcomes if (o.zoomed, o.noisy) == key] for key, name in names.items()}
-    return {name: ones for name, ones in sorted_.items() if ones}
+    """By whether they are zoomed, and what is known of the readings and the mount."""
+    sorted_: dict[str, list[Outcome]] = {}
+    for one in sorted(outcomes, key=lambda one: (one.zoomed, READINGS.index(one.readings))):
+        sorted_.setdefault(f"{'zoomed' if one.zoomed else 'wide'}, {one.readings}", []).append(one)
+    return sorted_
 
 
 def table(outcomes: Sequence[Outcome], refused: Refusals) -> Table:
@@ -140,7 +163,7 @@ def table(outcomes: Sequence[Outcome], refused: Refusals) -> Table:
                  "of these flipped", "magnification off", title=title)  # fmt: skip
     for name, ones in kinds(outcomes).items():
         figures = Figures.of(ones)
-        bound = bounds.NOISY_MM if "noisy" in name else bounds.EXACT_MM
+        bound = bounds.EXACT_MM if "exact" in name else bounds.NOISY_MM
         magnification = "" if figures.magnification is None else f"{figures.magnification:.4%}"
         rows.add_row(
             name, str(figures.count), f"{figures.median_mm:.1f}", f"{figures.most_mm:.1f}",

@@ -10,6 +10,7 @@ import pytest
 from services.vision.calibrate_mount import fit
 from services.vision.frames import Mount, Transform, rotation_z
 from services.vision.mount_squares import Known
+from tests import bounds
 from tests.vision.mount_trials import ARMS, SIZE_M, hung, judged, looks_at, mount_trial, placed, spread
 
 GUESS = Mount((0.0, 0.0, 0.0), "ceiling", **ARMS)
@@ -18,10 +19,10 @@ GUESS = Mount((0.0, 0.0, 0.0), "ceiling", **ARMS)
 def test_five_markers_that_are_a_centimetre_off_give_the_mount_to_a_centimetre_and_a_third_of_a_degree() -> None:
     rng = np.random.default_rng(1)
     trials = [mount_trial(rng) for _ in range(5)]
-    assert np.median([one.place_m for one in trials]) <= 0.010
+    assert np.median([one.place_m for one in trials]) <= bounds.MOUNT_M
     assert max(one.place_m for one in trials) <= 0.020
     assert max(one.turn_deg for one in trials) <= 0.45
-    assert np.median([one.turn_deg for one in trials]) <= 0.3
+    assert np.median([one.turn_deg for one in trials]) <= bounds.MOUNT_DEG
 
 
 @pytest.mark.parametrize("kind", ["ceiling", "shelf"])

@@ -22,9 +22,9 @@ def outcomes() -> dict[str, list[Outcome]]:
     ("kind", "bound"),
     [
         ("wide, exact", bounds.EXACT_MM),
-        ("wide, noisy", bounds.NOISY_MM),
+        ("wide, calibrated", bounds.NOISY_MM),
         ("zoomed, exact", bounds.EXACT_MM),
-        ("zoomed, noisy", bounds.NOISY_MM),
+        ("zoomed, calibrated", bounds.NOISY_MM),
     ],
 )
 def test_markers_are_where_they_are_said_to_be(

@@ -1,6 +1,7 @@
 """Calibrations as they are ordered: the plan for each, what is said meanwhile, and what becomes of the result.
 
-How a lens or a mount is learnt is in `lens.py` and `mount.py`, the motors in `ptz/`; the files are in `files.py`.
+How a lens, a mount, a zoom is learnt is in `lens.py`, `mount.py` and `zoom.py`, the motors in `ptz/`; the files are in
+`files.py` and `levels.py`.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ from typing import Literal
 from services import topics
 from services.bus import Message
 from services.camera import orders
-from services.camera.calibration import files, lens_page, mount_page
+from services.camera.calibration import files, lens_page, levels, mount_page, zoom_page
 from services.camera.calibration.lens import Showing
 from services.camera.calibration.mount import Touring
 from services.camera.calibration.section import settings
-from services.camera.calibration.shots import How
+from services.camera.calibration.shots import How, compared, taken
 from services.camera.calibration.study import study
-from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, TakeLens
+from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, CalibrateZoom, TakeLens
+from services.camera.calibration.zoom import Climb
 from services.camera.plan import Plan, attempt, wait
 from services.camera.ptz.trips import Trips
 from services.camera.ptz.zooming import widest
@@ -52,6 +54,9 @@ class Calibrator:
         if isinstance(command, CalibrateLens):
             self._lens_file()
             return self._told("lens", self._learn_lens(command, now))
+        if isinstance(command, CalibrateZoom):
+            self._lens_file()
+            return self._told("zoom", self._learn_zoom(now))
         return self._told("mount", self._learn_mount(self._touring(command), now))
 
     def take_lens(self, order: TakeLens, now: float) -> Plan[None]:
@@ -59,7 +64,7 @@ class Calibrator:
         self._keep(order.lens, now)
         yield from ()
 
-    def _told(self, what: Literal["lens", "mount"], plan: Plan[Calibration]) -> Plan[object]:
+    def _told(self, what: Literal["lens", "mount", "zoom"], plan: Plan[Calibration]) -> Plan[object]:
         """Says how it ended, whichever way."""
         last = Calibration(what=what, state="cancelled")
         try:
@@ -105,6 +110,7 @@ class Calibrator:
             config.limits,
             self.trips.skill,
             config.settle_s or SETTLE_S,
+            config.reading_noise_deg,
             self._say_touring,
         )
 
@@ -114,7 +120,7 @@ class Calibrator:
         found = yield from touring.plan(now)
         known, stops, name = touring.known, touring.stops, self.config.name
         page, _ = yield from study(lambda: mount_page.page(name, known, found, stops))
-        self.scanner.eye = replace(self.scanner.eye, mount=found.mount)
+        self.scanner.eye = replace(self.scanner.eye, mount=found.mount, mount_doubt=found.covariance[:6, :6])
         wrong = [str(marker) for marker, one in found.markers.items() if one.misplaced]
         return Calibration(
             what="mount",
@@ -126,6 +132,35 @@ class Calibrator:
             mount=settings(found.mount),
             report=self._report("mount", page),
         )
+
+    def _learn_zoom(self, now: float) -> Plan[Calibration]:
+        yield from self._ready(now)
+        how = How(self.scanner.picture, self.scanner.kind)
+        climb = Climb(
+            self.config.limits, self.trips.skill, self._look, lambda a, b: compared(a, b, how), self._say_climb
+        )
+        found = yield from climb.plan()
+        lens, file = self.scanner.eye.lens, levels.of_lens(self._lens_file())
+        page, _ = yield from study(lambda: zoom_page.page(self.config.name, found, climb.visits, lens, climb.wide, how))
+        levels.write(file, found, lens)
+        self.scanner.eye = replace(self.scanner.eye, levels=found)
+        return Calibration(
+            what="zoom",
+            state="done",
+            progress=1.0,
+            views=len(climb.visits),
+            values=zoom_page.values(found, lens),
+            file=str(file),
+            report=self._report("zoom", page),
+        )
+
+    def _look(self, now: float) -> Plan[tuple[bytes, float]]:
+        now = yield from wait(now + (self.config.settle_s or SETTLE_S))
+        return (yield from taken(now))
+
+    def _say_climb(self, climb: Climb) -> None:
+        views, progress = len(climb.visits), round(climb.progress, 3)
+        self._say(Calibration(what="zoom", state="running", progress=progress, views=views, said=climb.said))
 
     def _ready(self, now: float) -> Plan[float]:
         """The widest zoom, and how the picture is delivered."""

@@ -48,19 +48,25 @@ def write_lens(file: Path, lens: Lens, name: str, now: float) -> Path | None:
 
 
 def kept(file: Path, now: float) -> Path | None:
-    """A copy of a file beside it, named by the time; None when there is no file."""
+    """A copy of a file beside it, named by the time and as hidden from others as it; None when there is no file."""
     if not file.exists():
         return None
     copy = file.with_name(f"{file.name}.{time.strftime('%Y%m%d-%H%M%S', time.gmtime(now))}.bak")
-    replaced(copy, file.read_bytes())
+    replaced(copy, file.read_bytes(), like=file)
     return copy
 
 
-def replaced(file: Path, content: bytes) -> None:
-    """Writes a file; whoever reads meanwhile sees the old one or the new one, never a part."""
-    beside = file.with_name(f".{file.name}.{os.getpid()}")
-    with beside.open("wb") as output:
+def replaced(file: Path, content: bytes, *, like: Path | None = None) -> None:
+    """Writes a file; whoever reads meanwhile sees the old one or the new one, never a part.
+
+    Who may read it stays as it was, or is as `like` says: a configuration may hold passwords.
+    """
+    real, model = file.resolve(), like or file
+    beside = real.with_name(f".{real.name}.{os.getpid()}")
+    mode = model.stat().st_mode & 0o777 if model.exists() else 0o644
+    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as output:
+        os.fchmod(output.fileno(), mode)
         output.write(content)
         output.flush()
         os.fsync(output.fileno())
-    beside.replace(file)
+    beside.replace(real)

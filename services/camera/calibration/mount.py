@@ -25,7 +25,7 @@ from services.vision.frames import Array, Mount, camera_in_apartment
 from services.vision.lens import Lens
 from services.vision.mount_squares import Known, Look
 
-FRAMES = 3  # at each look
+FRAMES = 2  # at each look: more would only average what is a hundredth of a pixel
 ASIDE = ((0.0, 0.0), (13.0, 7.0), (-13.0, -7.0))  # a marker is looked at centred, and from readings beside that
 SWEEP_TILTS, SWEEP_DEG = (30.0, 62.0), 55.0  # the search all around: a picture is about 90 degrees wide
 RIM_PX = 10.0  # a marker nearer to the picture's rim is not used: the lens is known worst there
@@ -54,6 +54,7 @@ class Touring:
     limits: Limits
     skill: Skill
     settle_s: float
+    angle_deg: float
     tell: Callable[[Touring], None]
     said: str = ""
     progress: float = 0.0
@@ -76,10 +77,10 @@ class Touring:
         for index, (marker, (right, below)) in enumerate(wanted):
             pan, tilt = self._towards(marker)
             self._say(f"looks at marker {marker}", 0.3 + 0.6 * index / len(wanted))
-            now = yield from self._stop_at(pan + right, tilt + below, now)
+            now = yield from self._stop_at(pan + right, tilt + below, marker, now)
         self._say("that is enough, it is reckoned", 0.9)
         looks, known, guess = tuple(self.looks), self.known, self.guess
-        found, now = yield from study(lambda: fit(looks, known, guess))
+        found, now = yield from study(lambda: fit(looks, known, guess, self.angle_deg))
         self._check(found)
         yield from self._go(began.pan, began.tilt, now)
         return found
@@ -91,7 +92,7 @@ class Touring:
             if wanted in self.met or self.met >= set(self.known):
                 continue
             self._say(f"looks for markers, {len(self.met)} of {len(self.known)} found", 0.3 * index / len(ways))
-            now = yield from self._stop_at(pan, tilt, now)
+            now = yield from self._stop_at(pan, tilt, wanted, now)
         return now
 
     def _ways(self) -> Iterator[tuple[float, float, int | None]]:
@@ -106,8 +107,8 @@ class Touring:
             for pan in pans if row % 2 == 0 else pans[::-1]:
                 yield float(pan), tilt, None
 
-    def _stop_at(self, pan: float, tilt: float, now: float) -> Plan[float]:
-        """Goes there and takes in every known marker that is seen."""
+    def _stop_at(self, pan: float, tilt: float, wanted: int | None, now: float) -> Plan[float]:
+        """Goes there and takes in every known marker that is seen; there should be the `wanted` one, None: any."""
         reading, now = yield from self._go(pan, tilt, now)
         now = yield from wait(now + self.settle_s)
         jpegs = []
@@ -116,7 +117,7 @@ class Touring:
             jpegs.append(jpeg)
         how, dictionary, ids = self.how, self.dictionary, sorted(self.known)
         try:
-            shot, now = yield from study(lambda: markers_in(jpegs, how, dictionary, ids))
+            shot, now = yield from study(lambda: markers_in(jpegs, how, dictionary, ids, wanted))
         except Away:  # half a picture
             return now
         self.stops.append(Seen(reading, shot))

@@ -39,26 +39,37 @@ def with_mount(text: str, camera: str, mount: dict[str, Any]) -> str:
     ValueError when the camera does not stand there as a section of its own, one key on each line.
     """
     lines = text.splitlines()
-    start, end = _block(lines, _block(lines, (0, len(lines)), "cameras"), camera)
+    try:
+        start, end = _block(lines, _block(lines, (0, len(lines)), "cameras"), camera)
+    except LookupError as error:
+        raise ValueError(str(error)) from error
     depth = _depth(lines, start, end)
     left = dict(mount)
     try:
         first, last = _block(lines, (start, end), "mount")
-    except ValueError:
-        first = last = end
+    except LookupError:
         lines.insert(end, " " * depth + "mount:")
         first, last = end + 1, end + 1
-    inner = " " * _depth(lines, first, last) if last > first else " " * depth + STEP
-    for index in range(first, last):
-        found = KEY.match(lines[index])
-        if found and found["key"].strip() in left:
-            lines[index] = (
-                f"{found['indent']}{found['key']}: {_value(left.pop(found['key'].strip()))}{_comment(found['rest'])}"
-            )
-    while last > first and not lines[last - 1].strip():
-        last -= 1
-    lines[last:last] = [f"{inner}{key}: {_value(value)}" for key, value in left.items()]
+    inner = _depth(lines, first, last) if last > first else depth + len(STEP)
+    kept = _replaced(lines[first:last], inner, left)
+    lines[first:last] = [*kept, *(f"{' ' * inner}{key}: {_value(value)}" for key, value in left.items())]
     return "\n".join(lines) + "\n"
+
+
+def _replaced(lines: list[str], indent: int, left: dict[str, Any]) -> list[str]:
+    """The section's lines with the values that are in `left`, which are taken out of it; lists lose their own lines."""
+    kept, within = [], False
+    for line in lines:
+        found = KEY.match(line)
+        if found and len(found["indent"]) == indent:
+            key = found["key"].strip()
+            within = key in left
+            if within:
+                line = f"{' ' * indent}{found['key']}: {_value(left.pop(key))}{_comment(found['rest'])}"
+            kept.append(line)
+        elif not within or line.lstrip().startswith("#"):
+            kept.append(line)
+    return kept
 
 
 def _block(lines: list[str], within: tuple[int, int], key: str) -> tuple[int, int]:
@@ -75,7 +86,7 @@ def _block(lines: list[str], within: tuple[int, int], key: str) -> tuple[int, in
                 if _without_comment(found["rest"]).strip():
                     raise ValueError(f"expected {key} on lines of its own, got {lines[index].strip()!r}")
                 return index + 1, _end(lines, index + 1, within[1], indent)
-    raise ValueError(f"expected the key {key!r}, got none")
+    raise LookupError(f"expected the key {key!r}, got none")
 
 
 def _end(lines: list[str], start: int, limit: int, indent: int) -> int:

@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 
+from services.camera.calibration.study import study
 from services.camera.plan import Plan, ask, attempt, wait
 from services.camera.requests import Picture, Snapshot
 from services.camera.video import pictures
@@ -15,6 +16,7 @@ from services.vision.board import Board, Seen, find
 from services.vision.calibrate_lens import Array
 from services.vision.detect import detect
 from services.vision.frames import Kind
+from services.vision.zoom import Magnification, measure
 
 TRIES, AGAIN_S = 3, 0.3  # of a picture: the camera sometimes closes without an answer
 THUMB_PX = 960  # width of what the report shows
@@ -73,18 +75,31 @@ def board_in(jpeg: bytes, how: How, board: Board) -> BoardShot:
     return BoardShot((image.shape[1], image.shape[0]), pictures.thumbnail(image, THUMB_PX), seen)
 
 
-def markers_in(jpegs: Sequence[bytes], how: How, dictionary: str, targets: Sequence[int]) -> MarkerShot:
-    """Looks for markers in pictures of the same; corners are their mean, of markers that the first shows once."""
+def compared(wide: bytes, zoomed: bytes, how: How) -> Plan[tuple[Magnification, float]]:
+    """How much the second picture is magnified over the first, and the time then; Refused when it cannot be told."""
+    return study(lambda: measure(how.upright(wide), how.upright(zoomed)))
+
+
+def markers_in(
+    jpegs: Sequence[bytes], how: How, dictionary: str, known: Sequence[int], wanted: int | None
+) -> MarkerShot:
+    """Looks for known markers in pictures of the same; corners are their mean, of markers that the first shows once.
+
+    A marker that is hard to see is only looked for, which takes long, when it is the `wanted` one; None: all are.
+    """
     first = how.upright(jpegs[0])
-    found = {marker: [corners] for marker, corners in _once(first, dictionary, targets).items()}
-    for jpeg in jpegs[1:] if found else ():  # what the first does not show is not looked for again: that takes longest
+    seen = {marker: corners for marker, corners in _once(first, dictionary, None).items() if marker in known}
+    if wanted is None or wanted not in seen:
+        seen = {**seen, **_once(first, dictionary, known if wanted is None else [wanted])}
+    found = {marker: [corners] for marker, corners in seen.items()}
+    for jpeg in jpegs[1:] if found else ():
         for marker, corners in _once(how.upright(jpeg), dictionary, sorted(found)).items():
             found[marker].append(corners)
     mean = {marker: np.mean(corners, axis=0) for marker, corners in found.items() if 2 * len(corners) > len(jpegs)}
     return MarkerShot((first.shape[1], first.shape[0]), pictures.thumbnail(first, THUMB_PX), mean)
 
 
-def _once(image: pictures.Image, dictionary: str, targets: Sequence[int]) -> dict[int, Array]:
+def _once(image: pictures.Image, dictionary: str, targets: Sequence[int] | None) -> dict[int, Array]:
     seen = detect(image, dictionary, targets)
     ids = [one.marker for one in seen]
     return {one.marker: np.asarray(one.corners, float) for one in seen if ids.count(one.marker) == 1}

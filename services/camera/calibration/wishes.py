@@ -81,6 +81,17 @@ class CalibrateMount:
         return cls(tuple(wanted.markers.items()), wanted.doubt_m)
 
 
+@dataclass(frozen=True)
+class CalibrateZoom:
+    """Learn what each level of zoom magnifies by, from what the camera looks at."""
+
+    @classmethod
+    def read(cls, value: Any) -> Self:
+        """The order's value: True. ValueError when it is something else."""
+        _read(Section, value)
+        return cls()
+
+
 @dataclass(frozen=True, eq=False)
 class TakeLens:
     """Take over a lens that somebody else has calibrated, such as ROS's camera_calibration."""

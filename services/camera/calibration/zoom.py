@@ -16,7 +16,7 @@ from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.zooming import widest
-from services.camera.requests import Reading, Refused
+from services.camera.requests import Away, Reading, Refused
 from services.vision.zoom import WIDEST, Level, Magnification
 
 STEPS = 4  # between the narrowest and the widest: the status of these cameras tells five levels apart
@@ -42,15 +42,17 @@ class Visit:
 
 @dataclass
 class Climb:
-    """One calibration of the zoom. `tell` hears of every visit, and of every one that told nothing."""
+    """One calibration of the zoom. `tell` hears of every visit; `wide` is what the last ones were compared with."""
 
     limits: Limits
     skill: Skill
     look: Look
     compare: Compare
-    tell: Callable[[str], None] = lambda said: None
+    tell: Callable[[Climb], None] = lambda climb: None
     rounds: int = ROUNDS
     visits: list[Visit] = field(default_factory=list)
+    wide: bytes = b""
+    said: str = ""
     trouble: str = ""
 
     @property
@@ -64,9 +66,9 @@ class Climb:
         low, high = self.limits.zoom
         ways = [low + (high - low) * step / STEPS for step in range(1, STEPS + 1)]
         for _ in range(self.rounds):
-            wide, now = yield from self._widest(began, now)
+            self.wide, now = yield from self._widest(began, now)
             for zoom in (*ways, *reversed(ways)):
-                now = yield from self._visit(began, zoom, wide, now)
+                now = yield from self._visit(began, zoom, now)
         yield from goto(self._goal(began, began.zoom), self.limits, self.skill, now + MOVE_S)
         found = table(self.visits, low)
         if len(found) < 2:
@@ -83,18 +85,22 @@ class Climb:
         now = yield from widest(self.limits, self.skill, now)
         return (yield from self.look(now))
 
-    def _visit(self, began: Reading, zoom: float, wide: bytes, now: float) -> Plan[float]:
+    def _visit(self, began: Reading, zoom: float, now: float) -> Plan[float]:
         arrival = yield from goto(self._goal(began, zoom), self.limits, self.skill, now + MOVE_S)
         zoomed, now = yield from self.look(arrival.at)
         try:
-            seen, now = yield from self.compare(wide, zoomed)
-        except Refused as error:
+            seen, now = yield from self.compare(self.wide, zoomed)
+        except (Refused, Away) as error:  # nothing with an outline there, or half a picture
             self.trouble = str(error)
-            self.tell(f"zoom {arrival.reading.zoom:g}: {error}")
+            self._say(arrival.reading, self.trouble)
             return now
         self.visits.append(Visit(arrival.reading.zoom, seen))
-        self.tell(f"zoom {arrival.reading.zoom:g}: {seen.times:.3f} times, {seen.relative:.2%} unsure")
+        self._say(arrival.reading, f"{seen.times:.3f} times, {seen.relative:.2%} unsure")
         return now
+
+    def _say(self, reading: Reading, what: str) -> None:
+        self.said = f"zoom {reading.zoom:g}: {what}"
+        self.tell(self)
 
 
 def table(visits: Sequence[Visit], low: float) -> tuple[Level, ...]:

@@ -12,6 +12,7 @@ from services.camera.requests import Reading, Reply
 
 PAN, TILT, ZOOM = range(3)
 READ_DEG = 0.08  # the resolution, and a little dither
+ZOOM_SLOWS_S = 0.1  # coarse readings do not teach how long zoom takes to stop
 TIME_S = 0.02  # what is left of the timing of a command or a reading when all that is learnt is taken off
 
 
@@ -61,7 +62,8 @@ class Course:
             if told and told[-1].level == 0:
                 before = max((abs(one.level) for one in told), default=0)
                 last = abs(told[-2].level) if len(told) > 1 else before
-                ends.append(told[-1].at + max(0.0, pace.other(STOP_LATE)) + pace.change(last))
+                slowing = max(ZOOM_SLOWS_S if axis == ZOOM else 0.0, pace.change(last))
+                ends.append(told[-1].at + max(0.0, pace.other(STOP_LATE)) + slowing)
         return max(ends)
 
     def doubt(self, axis: int, when: float) -> float:
@@ -103,12 +105,12 @@ class Course:
         self.told[axis][:] = [one._replace(level=-one.level) for one in self.told[axis]]
         self.levels[axis] = -self.levels[axis]
 
-    def leave(self, zoom: float) -> None:
-        """The firmware drives on by itself: what was told is over, and where that led will be read."""
+    def leave(self, pose: Pose) -> None:
+        """The firmware drives on by itself: what was told is over, and where it leads will be read."""
         for told in self.told:
             told.clear()
         self.levels = [0, 0, 0]
-        self.origin = (self.origin[PAN], self.origin[TILT], zoom)
+        self.origin = pose
 
     def stand(self, pose: Pose) -> None:
         """Pan and tilt were read at rest: they start anew from there, and zoom too unless it turns."""

@@ -25,6 +25,7 @@ BESIDE_DEG = 6.0  # farther from what was asked for, it was not honoured
 PLANE_DEG = 12.0  # the picture's plane is flat enough for so much
 PLANE_TAN = (1.0, 0.56)  # of the whole scale at the widest zoom, a guess to begin with
 LEAST_DEG = 0.3
+ZOOM_LATE_S = 0.04  # it may still slow down when its coarse reading is the last one
 NOISE_DEG, NOISE_S = 0.2, 0.03  # of a reading on the way
 WITHIN_DEG = 0.1  # what is asked for stays so far from an end stop
 
@@ -110,7 +111,8 @@ def seconds(pace: Pace, distance: float) -> float:
 
 def longest(skill: Skill, here: Pose, there: Pose) -> float:
     """How long the firmware needs for all axes."""
-    return max(seconds(pace, abs(b - a)) for pace, a, b in zip(skill.drives, here, there, strict=True))
+    pan, tilt, zoom = (seconds(pace, abs(b - a)) for pace, a, b in zip(skill.drives, here, there, strict=True))
+    return max(pan, tilt, zoom + ZOOM_LATE_S if zoom else 0.0)
 
 
 def learn_on_the_way(skill: Skill, here: Pose, drive: Drive, begun: Reply, reply: Reply, seen: Pose) -> None:
@@ -130,20 +132,27 @@ def learn_on_the_way(skill: Skill, here: Pose, drive: Drive, begun: Reply, reply
 
 def judge(skill: Skill, here: Pose, drive: Drive, there: Pose) -> None:
     """Where it led: whether the firmware honours this, and how far off it is."""
-    off = tuple(there[axis] - drive.to[axis] for axis in (PAN, TILT))
     match drive.request:
         case GotoPreset(number):
             skill.presets[number] = (there[PAN] % 360.0, there[TILT], there[ZOOM])
-        case MoveTo(form=form):
-            before = skill.beside.get(form, (0.0, 0.0))
-            if abs(off[PAN]) > BESIDE_DEG or abs(off[TILT]) > BESIDE_DEG:
-                tilt_ignored = abs(off[PAN]) <= BESIDE_DEG and abs(there[TILT] - here[TILT]) < LEAST_DEG
-                skill.honours[form] = "pan" if tilt_ignored else "no"
-            else:
-                skill.honours[form] = "yes"
-                skill.beside[form] = (before[PAN] + off[PAN], before[TILT] + off[TILT])
+        case MoveTo():
+            _judge_to(skill, here, drive, drive.request, there)
         case MoveOver():
             _judge_over(skill, here, drive.request, there)
+
+
+def _judge_to(skill: Skill, here: Pose, drive: Drive, request: MoveTo, there: Pose) -> None:
+    """A first one that asked for hardly any tilt does not tell whether that is honoured."""
+    off = tuple(there[axis] - drive.to[axis] for axis in (PAN, TILT))
+    proven, asked = skill.honours.get(request.form) == "yes", abs(drive.to[TILT] - here[TILT])
+    stayed = abs(there[TILT] - here[TILT]) < LEAST_DEG / 2
+    if max(map(abs, off)) > BESIDE_DEG or (not proven and asked > LEAST_DEG and stayed):
+        tilt_ignored = abs(off[PAN]) <= BESIDE_DEG and abs(there[TILT] - here[TILT]) < LEAST_DEG
+        skill.honours[request.form] = "pan" if tilt_ignored else "no"
+    elif proven or asked > LEAST_DEG:
+        before = skill.beside.get(request.form, (0.0, 0.0))
+        skill.honours[request.form] = "yes"
+        skill.beside[request.form] = (before[PAN] + off[PAN], before[TILT] + off[TILT])
 
 
 def _judge_over(skill: Skill, here: Pose, request: MoveOver, there: Pose) -> None:
@@ -168,10 +177,10 @@ def refuse(skill: Skill, drive: Drive) -> None:
 
 
 def certain(skill: Skill, drive: Drive) -> bool:
-    """Whether it is known from experience where this leads."""
+    """Whether it is known where this leads, from experience or, of a preset, from the place that has it."""
     match drive.request:
-        case GotoPreset(number):
-            return number in skill.presets
+        case GotoPreset():
+            return True
         case MoveTo(form=form):
             return skill.honours.get(form) == "yes"
     return False

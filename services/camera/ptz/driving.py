@@ -11,11 +11,12 @@ from services.camera.ptz import drive as own
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import Helm
-from services.camera.ptz.leg import NEAR_DEG
 from services.camera.ptz.pace import READ_LATE
+from services.camera.ptz.skill import NEARER_DEG
 from services.camera.requests import Reading, Refused, Reply, Request, Status
 
 MOST_DRIVES = 4  # in one move
+TRY_LEFT = 7  # commands; with fewer nothing new is tried
 LOOKS = 15
 LONG_S = 2.0  # a drive that takes longer is looked at on the way, which costs no time
 
@@ -34,7 +35,9 @@ class Driving:
         aim = (self.helm.aim[PAN], self.helm.aim[TILT], self.helm.goal.pose[ZOOM])
         while self.helm.zoom_ends is None and self.drives < MOST_DRIVES:
             way = own.find(here, aim, self.helm.limits, self.helm.skill, self.presets)
-            if way is None or way.request in self.tried or (self.drives > 1 and not own.honoured(self.helm.skill, way)):
+            if way is None or way.request in self.tried:
+                break
+            if not own.honoured(self.helm.skill, way) and self._late():
                 break
             self.drives += 1
             self.tried.append(way.request)
@@ -45,6 +48,10 @@ class Driving:
                 continue
             return (yield from self._arrive(way, here, begun))
         return None
+
+    def _late(self) -> bool:
+        """Whether there is no time to try something new: one in a move, and while there are commands left."""
+        return self.drives > 0 or self.helm.left < TRY_LEFT
 
     def _arrive(self, way: own.Drive, here: Pose, begun: Reply) -> Plan[tuple[Reading, float]]:
         """Looks at the firmware's own move until it has ended; once on the way, where its speed is not known well."""
@@ -80,4 +87,4 @@ class Driving:
         if not own.certain(self.helm.skill, way):
             return False
         pose = self.helm.limits.pose(reading)
-        return all(abs(pose[axis] - way.to[axis]) <= NEAR_DEG for axis in (PAN, TILT))
+        return all(abs(pose[axis] - way.to[axis]) <= NEARER_DEG for axis in (PAN, TILT))

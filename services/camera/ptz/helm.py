@@ -13,6 +13,7 @@ from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import stop as until_confirmed
 from services.camera.requests import Direction, Reading, Reply, Request, Start, Status
 
+NEAR_LEVELS = 0.5
 EDGES: Pose = (EDGE_DEG, EDGE_DEG, 0.3)  # how far from the ends of its range each axis stays
 COARSE_EDGE = 0.25  # of a step of zoom's reading, where that is coarse
 ODD_DEG = 0.4  # a reading farther from what was reckoned may not be of a camera at rest
@@ -23,6 +24,7 @@ FOREVER = 1e12
 WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
 SURPRISES = 0.2  # of what was known before is replaced by each rest
 DIRECTIONS = {direction.value: direction for direction in Direction}
+COMMANDS = 10  # a move should need no more: 12 are promised, and an answer may come late
 Levels = tuple[int, int, int]
 
 
@@ -38,6 +40,11 @@ class Helm:
         self.zoom_ends: float | None = None
         self.quiet = 0.0  # until then the firmware drives by itself
         self.course = Course(limits, skill, self.aim)
+
+    @property
+    def left(self) -> int:
+        """How many commands are left."""
+        return COMMANDS - self.commands
 
     def pose(self, reading: Reading) -> Pose:
         """A reading as a pose, with what is known better of zoom."""
@@ -87,6 +94,7 @@ class Helm:
         reply = yield from self.send(Status())
         reading = cast(Reading, reply.result)
         self._weigh(reading)
+        self._see_still(reading)
         self.course.read(reply, reading)
         while self.zoom_ends is None and (
             pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading) or self._moves(reading)
@@ -110,6 +118,13 @@ class Helm:
             if fastest > WEIGHED_DEG_S:
                 wrong = max(0.0, abs(pose[axis] - self.course.stopped(axis, FOREVER)) - NOISE_DEG) / fastest
                 self.skill.surprise += SURPRISES * (wrong - self.skill.surprise)
+
+    def _see_still(self, reading: Reading) -> None:
+        """An axis that was not turned shows how well readings repeat."""
+        pose = self.limits.pose(reading)
+        for axis in (PAN, TILT):
+            if not self.course.told[axis] and not self.quiet:
+                self.skill.see_still(pose[axis] - self.course.origin[axis])
 
     def reckoned(self, axis: int) -> float:
         """How far off the reckoned place of rest of an axis may be, degrees."""
@@ -155,6 +170,11 @@ class Helm:
         low, high = self.limits.zoom
         edge = self.zoom_edge()
         return min(high - edge, max(low + edge, self.goal.pose[ZOOM]))
+
+    @property
+    def zoom_near(self) -> float:
+        """As near as that zoom has arrived: its coarse reading is the goal's then."""
+        return max(NEAR_LEVELS, self.skill.zoom_grid / 2)
 
     def zoom_edge(self) -> float:
         """How far from an end of its range zoom stays."""

@@ -43,6 +43,7 @@ class _Kept(BaseModel):
     worst: float
     surprise: float
     arrives_late: float
+    steady: int = 0
     diagonals: bool
     zoom_steps: list[float]
     honours: dict[str, Honours]
@@ -118,6 +119,7 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
         worst=skill.timing.worst,
         surprise=skill.surprise,
         arrives_late=skill.arrives_late,
+        steady=skill.steady,
         diagonals=skill.diagonals,
         zoom_steps=skill.zoom_steps,
         honours=skill.honours,
@@ -144,5 +146,6 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
         skill.timing.learn(kept.took[-1])
     skill.timing.count, skill.timing.worst = kept.count, kept.worst
     skill.surprise, skill.arrives_late = kept.surprise, kept.arrives_late
+    skill.steady = kept.steady
     skill.diagonals, skill.zoom_steps, skill.honours = kept.diagonals, kept.zoom_steps, kept.honours
     skill.beside, skill.presets, skill.planes = kept.beside, kept.presets, kept.planes

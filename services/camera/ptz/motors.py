@@ -11,12 +11,13 @@ from typing import Any
 
 from services.camera import orders
 from services.camera.answers import Answers, Job
-from services.camera.orders import Command, MoveBy, ScanFor
+from services.camera.orders import Command, MoveBy
 from services.camera.plan import Plan, Run, Stage
 from services.camera.ptz.move import Arrival
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import Hold, halt, stop
 from services.camera.requests import Refused
+from services.camera.scan.wish import ScanFor
 from services.payloads import OrderState
 
 STOP_LIMIT_S = 10.0  # a Stop order that is not confirmed by then has failed; the stopping goes on

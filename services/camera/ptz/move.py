@@ -17,11 +17,10 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.driving import Driving
 from services.camera.ptz.goal import Goal, Limits, Pose
 from services.camera.ptz.helm import Helm
-from services.camera.ptz.leg import NEAR_DEG
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.turning import Turning
-from services.camera.ptz.zooming import NEAR_LEVELS, Zooming
+from services.camera.ptz.zooming import Zooming
 from services.camera.requests import Reading
 from services.errors import DeviceError
 
@@ -105,9 +104,8 @@ class Move:
     def _out(self, reading: Reading) -> list[int]:
         """The axes that are not where they should be; zoom only while it does not turn."""
         pose = self.helm.limits.pose(reading)
-        near = max(NEAR_LEVELS, self.helm.skill.zoom_grid / 2)
-        out = [axis for axis in (PAN, TILT) if abs(self.helm.goal.pose[axis] - pose[axis]) > NEAR_DEG]
-        if self.helm.zoom_ends is None and abs(self.helm.goal.pose[ZOOM] - pose[ZOOM]) > near:
+        out = [axis for axis in (PAN, TILT) if abs(self.helm.goal.pose[axis] - pose[axis]) > self.helm.skill.near]
+        if self.helm.zoom_ends is None and abs(self.helm.goal.pose[ZOOM] - pose[ZOOM]) > self.helm.zoom_near:
             out.append(ZOOM)
         return out
 

@@ -28,7 +28,9 @@ DOUBT = (0.006, 0.04, 0.12, 0.4, 0.2)
 LEAST = (0.0002, -0.3, -1.0, 0.0, 0.0)
 MOST = (0.05, 0.6, 1.0, 1.0, 1.0)
 RATE_DOUBT = 0.7  # of the guess
+COMMON, NEIGHBOURS = 0.5, 4.0  # what all speeds have in common; and how many steps apart they say little of another
 SLOWEST = 0.05
+FLOOR = 0.2  # of the guess: what other speeds teach of one makes it no slower
 DRIFT = 0.002  # of each rate, per motion: motors age
 OUTLIER = 3.0  # standard deviations; beyond, a reading counts for less
 
@@ -56,7 +58,8 @@ Vector = NDArray[np.float64]
 def _prior(guess: Sequence[float]) -> tuple[Vector, Vector]:
     rates = np.array(guess, float)
     steps = np.arange(len(rates))
-    alike = 0.5 + 0.5 * np.exp(-np.abs(steps[:, None] - steps[None, :]) / 2.0)
+    apart = np.abs(steps[:, None] - steps[None, :])
+    alike = COMMON + (1 - COMMON) * np.exp(-np.square(apart / NEIGHBOURS))
     cov = np.zeros((len(rates) + 5, len(rates) + 5))
     cov[: len(rates), : len(rates)] = RATE_DOUBT**2 * alike * np.outer(rates, rates)
     cov[len(rates) :, len(rates) :] = np.diag(np.square(DOUBT))
@@ -153,7 +156,7 @@ class Pace:
 
     def _keep_within(self) -> None:
         count = len(self.guess)
-        self.mean[:count] = np.maximum(self.mean[:count], SLOWEST)
+        self.mean[:count] = np.maximum(self.mean[:count], FLOOR * np.array(self.guess))
         self.mean[count:] = np.clip(self.mean[count:], LEAST, MOST)
 
     def _slope(self, told: Sequence[Told], seen: Seen) -> tuple[float, Vector]:

@@ -17,8 +17,15 @@ DRIVES = (45.0, 27.0, 4.0)  # degrees/s, levels/s: the firmware's own moves, a g
 KEEP = 120  # answers, for how long they take
 LATENCY_S, SPREAD_S = 0.3, 0.1  # of an answer, before any was measured
 TAIL_S = 1.0  # an answer may always come so much later than usual: busy Wi-Fi does that to two in a hundred
+TAIL_PART = 3.3  # of the usual time, where that is long
 FORGETS, WORSE = 0.998, 1.2  # of the latest answer: kept with each one more; and it may be later the next time
 SOONER_S, LATER_S, MOST_LATE_S = 0.008, 0.04, 0.5
+NEAR_DEG, NEARER_DEG = (
+    0.42,
+    0.35,
+)  # a reading as near as that has arrived: 0.5 promised, resolution and dither taken off
+STILL_DEG = 0.05
+STEADY = 6  # readings at rest that were alike show that they do not dither
 GRIDS = (2.0, 1.0)  # some firmware tells zoom in coarse steps
 
 
@@ -55,7 +62,7 @@ class Timing:
     @property
     def tail(self) -> float:
         """How much later than usual an answer may come: what happened, or more."""
-        return max(TAIL_S, WORSE * self.worst, self.spread)
+        return max(TAIL_S, TAIL_PART * self.usual, WORSE * self.worst, self.spread)
 
 
 @dataclass
@@ -70,6 +77,7 @@ class Skill:
     picture: tuple[bool, bool] = (False, False)  # flip and mirror, with which the senses were seen
     surprise: float = 0.1  # s: how far off a place of rest is reckoned, over the speed before it
     diagonals: bool = True
+    steady: int = 0  # readings of an axis at rest that were alike; -1: two were not, they dither
     always_moving: bool = False  # it says that it moves while it rests
     zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
@@ -85,6 +93,16 @@ class Skill:
         self.picture = (flip, mirror)
         self.senses[0].sign, self.senses[0].sure = (1 if mirror else -1), False
         self.senses[1].sign, self.senses[1].sure = (1 if flip else -1), False
+
+    @property
+    def near(self) -> float:
+        """As near as that a reading has arrived, degrees."""
+        return NEAR_DEG if self.steady >= STEADY else NEARER_DEG
+
+    def see_still(self, change: float) -> None:
+        """Two readings of an axis at rest differ by so much."""
+        if self.steady >= 0:
+            self.steady = -1 if abs(change) > STILL_DEG else self.steady + 1
 
     def expect_arrival(self, *, there: bool) -> None:
         """The first look at a drive's end: a little sooner the next time, or later; about one in six comes too soon."""

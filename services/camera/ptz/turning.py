@@ -9,23 +9,28 @@ from typing import cast
 
 from services.camera.plan import Plan, wait
 from services.camera.ptz import drive as own
-from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.course import PAN, TILT
 from services.camera.ptz.helm import Helm, levels_of, sign
-from services.camera.ptz.leg import DANGER, GOOD_DEG, NEAR_DEG, Leg, Way, choose
+from services.camera.ptz.homing import Homing
+from services.camera.ptz.leg import DANGER, Leg, choose
+from services.camera.ptz.outlook import Way
 from services.camera.ptz.zooming import Zooming
 from services.camera.requests import Reading, Refused, Status
 
-RUNGS = 3  # legs without a rest between them
+RUNGS = 5  # legs without a rest between them
 RECKONED_DEG = 0.4
-FEW_COMMANDS = 3  # after so many, accuracy goes before time
-DEARER = 0.7  # each command more makes a correction so much dearer
+BESIDE_DEG = 0.2  # less is not worth to be put right
+LOST_DEG = 1.0  # as much doubt about the place of an axis that turns is usual
+SHARP_DEG = 0.05  # what a reckoning leaves open, at least
+ZOOM_COMMANDS = 1  # zoom's start is the end of a leg
 MANY_COMMANDS = 7  # after so many, a look has to be worth more
 ENOUGH_DEG = 0.4  # doubt about the place of an end that needs no look
 PROBE_DEG_S = 9.0
 PROBE_S = 0.35  # seen in the readings, and harmless the wrong way
 MOVED_DEG = 0.3
 PROBE_LOOKS = 3
-LOOKS = 2  # readings in a leg
+LOOKS = 1  # readings in a leg
+LOOK_PART = 1.0  # of what a late end makes of a leg: doubt below that needs no look
 
 
 class Turning:
@@ -33,6 +38,7 @@ class Turning:
 
     def __init__(self, helm: Helm, zooming: Zooming) -> None:
         self.helm, self.zooming = helm, zooming
+        self.homing = Homing(helm, self._watch)
 
     def turn(self, axes: list[int], now: float, *, zoom: bool) -> Plan[float]:
         """One leg of pan and tilt; it ends with a stop, or with zoom in its place. Returns when that was answered."""
@@ -42,8 +48,8 @@ class Turning:
         try:
             if unsure:
                 now = yield from self._probe(unsure)
-            elif axes == [PAN] and own.pan_only(self.helm.skill):
-                return (yield from self._home_pan(now))
+            elif own.pan_only(self.helm.skill) and (zoom or PAN in axes):
+                return (yield from (self.homing.tilt(now) if TILT in axes else self.homing.home(now)))
             return (yield from self._legs(axes, now, zoom=zoom))
         except Refused:
             if not self.helm.skill.diagonals or len(axes) < 2:
@@ -55,42 +61,40 @@ class Turning:
         """Legs without a reading between them, as long as it is known well enough where each one ends."""
         for _ in range(RUNGS):
             now = yield from self._swing(axes, now)
-            leg, turning = self._choose(axes, now)
+            leg, turning = self._choose(axes, now, zoom=zoom)
             if leg.cost >= DANGER and any(self.helm.course.levels[:2]):
                 return (yield from self.helm.stop(now))  # from rest there will be a better one
-            now = (yield from self.helm.start(levels_of(turning))).received
+            if levels_of(turning) != tuple(self.helm.course.levels):
+                now = (yield from self.helm.start(levels_of(turning))).received
             now = yield from self._see_through(leg, turning, now)
             others = [axis for axis in axes if axis not in leg.parts]
-            axes = others or self._goes_on(leg, now)
-            if axes:
+            ahead = others or self._goes_on(leg, now)
+            if ahead:
+                axes = sorted({*ahead, *self._beside(now)})
                 continue
-            if own.pan_only(self.helm.skill) and (zoom or PAN in leg.parts):
-                return (yield from self._home_pan(now))
             now = yield from (self.zooming.begin() if zoom else self.helm.stop(now))
             zoom, axes = False, self._reckon(now)
             if not axes:
                 return now
             if self.helm.zoom_ends is not None:
                 now = yield from wait(max(now, self.helm.zoom_ends))
-        return (yield from self.helm.stop(now))
-
-    def _home_pan(self, now: float) -> Plan[float]:
-        """Firmware that takes a position but ignores its tilt ends a leg: pan and zoom become exact, tilt ends."""
-        helm = self.helm
-        here = tuple(helm.course.stopped(axis, now) for axis in range(3))
-        way = own.to_pan((here[0], here[1], here[2]), (helm.aim[PAN], here[TILT], helm.goal.pose[ZOOM]))
-        now = (yield from helm.send(way.request)).received
-        helm.course.leave(here[ZOOM])
-        helm.quiet = now + own.longest(helm.skill, (here[0], here[1], here[2]), way.to)
-        return now
+        return (yield from self.helm.stop(now)) if any(self.helm.course.levels) else now
 
     def _reckon(self, now: float) -> list[int]:
         """The axes that will rest beside the goal, where that is reckoned well enough to go on without a reading."""
         turned = [axis for axis in (PAN, TILT) if self.helm.course.told[axis]]
         if any(self.helm.reckoned(axis) > RECKONED_DEG for axis in turned):
             return []
-        off = {axis: abs(self.helm.aim[axis] - self.helm.course.stopped(axis, now)) for axis in turned}
-        return [axis for axis, distance in off.items() if distance > GOOD_DEG]
+        return [axis for axis in turned if self._off(axis, now) > self.helm.skill.near - SHARP_DEG]
+
+    def _beside(self, now: float) -> list[int]:
+        """The axes that rest beside the goal as far as is reckoned: while the other goes on, they can be put right."""
+        rest = [axis for axis in (PAN, TILT) if not self.helm.course.levels[axis]]
+        return [axis for axis in rest if self._off(axis, now) > self.helm.reckoned(axis) + BESIDE_DEG]
+
+    def _off(self, axis: int, now: float) -> float:
+        """How far from the goal an axis will rest when it is ended."""
+        return abs(self.helm.aim[axis] - self.helm.course.stopped(axis, now))
 
     def _see_through(self, leg: Leg, turning: dict[int, int], now: float) -> Plan[float]:
         """From the start of a leg to the time for its end; an axis that ends before the other is ended."""
@@ -102,36 +106,43 @@ class Turning:
 
     def _goes_on(self, leg: Leg, now: float) -> list[int]:
         """The axes that need another leg at once: it ended early for fear of a stop, and is known well enough."""
-        timing, ahead = self.helm.skill.timing, {}
+        ahead, ends = [], now + self.helm.skill.timing.usual
         for axis, part in leg.parts.items():
-            ends = now + timing.usual
-            spread = self.helm.skill.paces[axis].rate(part.speed) * timing.spread + self.helm.course.doubt(axis, ends)
-            left = abs(self.helm.aim[axis] - self.helm.course.stopped(axis, ends))
-            if left > NEAR_DEG:
-                ahead[axis] = left > spread + NEAR_DEG
-        return list(ahead) if leg.feared and ahead and all(ahead.values()) else []
+            spread = self.helm.skill.paces[axis].rate(part.speed) * self.helm.skill.timing.spread
+            spread += self.helm.course.doubt(axis, ends)
+            left = (self.helm.aim[axis] - self.helm.course.stopped(axis, ends)) * sign(self.helm.course.levels[axis])
+            if left > spread + self.helm.skill.near:
+                ahead.append(axis)
+        return ahead if leg.feared else []
 
     def _swing(self, axes: list[int], now: float) -> Plan[float]:
         """Where even the smallest step is too long, it begins the other way; the leg then turns it round."""
         levels = [0, 0, 0]
         for axis in axes if self.helm.skill.diagonals else axes[:1]:
             distance, least = self.helm.aim[axis] - self.helm.course.stopped(axis, now), self.helm.least(axis)
-            if least - abs(distance) > NEAR_DEG:
+            if least - abs(distance) > self.helm.skill.near:
                 levels[axis] = -sign(distance)
         if any(levels):
             return (yield from self.helm.start((levels[0], levels[1], levels[2]))).received
         return now
 
-    def _choose(self, axes: list[int], now: float) -> tuple[Leg, dict[int, int]]:
+    def _choose(self, axes: list[int], now: float, *, zoom: bool) -> tuple[Leg, dict[int, int]]:
         """The next leg and its levels, from where it stands, or from where it will be when the start takes effect."""
         ways = {}
         for axis in axes:
             distance = self.helm.aim[axis] - self.helm.course.stopped(axis, now + self.helm.skill.timing.usual)
             low, high = self.helm.limits.ranges[axis]
             room = high - self.helm.aim[axis] if distance > 0 else self.helm.aim[axis] - low
-            ways[axis] = Way(distance, room, self.helm.skill.paces[axis])
-        leg = choose(ways, self.helm.skill, hurry=1.0 + DEARER * max(0, self.helm.commands - FEW_COMMANDS))
+            doubt = self.helm.course.doubt(axis, now) if self.helm.course.told[axis] else 0.0
+            ways[axis] = Way(distance, room - 2 * max(0.0, doubt - LOST_DEG), self.helm.skill.paces[axis])
+        left = self.helm.left - (ZOOM_COMMANDS if zoom else 0)
+        leg = choose(ways, self.helm.skill, left=left, runs=self._runs(ways))
         return leg, {axis: part.speed * (sign(ways[axis].distance) or 1) for axis, part in leg.parts.items()}
+
+    def _runs(self, ways: dict[int, Way]) -> dict[int, int]:
+        """The speeds of the axes that turn already, the right way."""
+        levels = self.helm.course.levels
+        return {axis: abs(levels[axis]) for axis, way in ways.items() if levels[axis] * way.distance > 0}
 
     def _end(self, leg: Leg, axis: int, now: float) -> float:
         """When the end of an axis has to take effect."""
@@ -158,8 +169,9 @@ class Turning:
                 send = min(ends.values()) - usual
             if look == LOOKS or send - now < usual + spread:
                 break
-            enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else NEAR_DEG
-            if all(self.helm.course.doubt(axis, ends[axis]) < max(0.4 * spread * rates[axis], enough) for axis in left):
+            enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else self.helm.skill.near
+            small = {axis: max(LOOK_PART * spread * rate, enough) for axis, rate in rates.items()}
+            if all(self.helm.course.doubt(axis, ends[axis]) < small[axis] for axis in left):
                 break
             latest = send - usual - spread
             sure = all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)

@@ -10,13 +10,13 @@ from typing import cast
 from services.camera.plan import Plan, ask, wait
 from services.camera.ptz.course import ZOOM
 from services.camera.ptz.goal import Limits
-from services.camera.ptz.helm import Helm, sign
+from services.camera.ptz.helm import NEAR_LEVELS, Helm, sign
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import stop
 from services.camera.requests import Direction, Reading, Start, Status
 
-NEAR_LEVELS = 0.5
 WIDE_LEVELS, HELD_S = 0.05, 0.2
+BEYOND = 0.8  # of what is near enough may be gone beyond the goal
 LOOKS = 3  # readings while it turns
 
 
@@ -50,7 +50,7 @@ class Zooming:
         """Starts zoom; it goes on. A way that is shorter than the smallest step begins the other way."""
         way = self._way()
         level = sign(way) or 1
-        if abs(way) < self.helm.least(ZOOM) - self.helm.zoom_edge():
+        if self.helm.least(ZOOM) - abs(way) > BEYOND * self.helm.zoom_near:
             yield from self.helm.start((0, 0, -level))
         now = (yield from self.helm.start((0, 0, level))).received
         self.helm.time_zoom(now)

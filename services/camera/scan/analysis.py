@@ -32,8 +32,9 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Task:
-    """One frame, and what to look for in it. `flip`, `mirror`: as it was delivered. `draw`: send the picture back.
+    """One frame, and what to look for in it. `flip`, `mirror`: as it was delivered.
 
+    `draw`: send the picture back; of the frames of a place the first with a marker in it is sent back in any case.
     `of` frames with this `still` come in all, taken by a camera that stood still in between; 1: this one alone.
     """
 
@@ -85,7 +86,11 @@ def analyse(tasks: Sequence[Task]) -> list[Analysed]:
         for one in detect_still([frames[number] for number in numbers], tasks[0].dictionary, tasks[0].targets):
             for number, detection in _in_each(one, numbers):
                 seen[number].append(detection)
-    return [_analysed(task, image, seen.get(task.number, [])) for task, image in zip(tasks, decoded, strict=True)]
+    shown = next((number for number in seen if seen[number]), None)
+    return [
+        _analysed(task, image, seen.get(task.number, []), draw=task.draw or task.number == shown)
+        for task, image in zip(tasks, decoded, strict=True)
+    ]
 
 
 def _decoded(task: Task) -> Picture | Away:
@@ -106,10 +111,10 @@ def _in_each(one: Still, numbers: Sequence[int]) -> list[tuple[int, Detection]]:
     return [(numbers[index], Detection(found.marker, corners, found.confidence)) for index, corners in agreeing]
 
 
-def _analysed(task: Task, image: Picture | Away, found: Sequence[Detection]) -> Analysed:
+def _analysed(task: Task, image: Picture | Away, found: Sequence[Detection], *, draw: bool) -> Analysed:
     if isinstance(image, Away):
         return Analysed(task.scan, task.number, error=str(image))
-    jpeg = _drawn(task, found) if task.draw else None
+    jpeg = _drawn(task, found) if draw else None
     return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), tuple(found), jpeg)
 
 

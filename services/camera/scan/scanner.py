@@ -13,12 +13,12 @@ from uuid import uuid4
 from services import topics
 from services.bus import Message
 from services.camera.bulletin import Bulletin
-from services.camera.orders import ScanFor
 from services.camera.places import Places
 from services.camera.plan import Plan, wait
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Away, Picture, Refused
 from services.camera.scan import sightings
+from services.camera.scan.album import Album
 from services.camera.scan.analysis import Analysed, Analyst, Task
 from services.camera.scan.findings import Findings, Frame
 from services.camera.scan.live import Live
@@ -27,6 +27,7 @@ from services.camera.scan.route import shortest
 from services.camera.scan.search import Scan
 from services.camera.scan.sightings import Eye, Sought
 from services.camera.scan.source import Moving, Source
+from services.camera.scan.wish import ScanFor
 from services.camera.settings import Config
 from services.errors import DeviceError
 from services.payloads import OrderState, Place, ScanResult, ScanState
@@ -59,6 +60,7 @@ class Scanner:
         self.frames = 0
         self.scan: Scan | None = None
         self.modes = Modes(config.state and config.state / "cameras" / f"{config.name}-picture.json")
+        self.album = Album(config.state and config.state / "cameras" / f"{config.name}-seen", config.hits)
         self.due: float | None = None  # when frames are to be handed on
         self.begin: Callable[[Plan[None], float], None] = lambda plan, now: None  # a plan whose end nobody waits for
         self.moving: Moving | None = None  # another stream than the camera's own: in virtual time
@@ -80,10 +82,11 @@ class Scanner:
     def plan(self, order: ScanFor, now: float) -> Plan[None]:
         """A new scan."""
         self.modes.forget()
+        self.album.begin()
         routine, targets = self._visits(order), order.targets or self.targets
         self.scan = Scan(
             name=uuid4().hex[:12],
-            findings=Findings(targets, self.config.frames, self.kind),
+            findings=Findings(targets, order.frames or self.config.frames, self.kind),
             routine=routine,
             limits=self.config.limits,
             skill=self.skill,
@@ -108,6 +111,10 @@ class Scanner:
         if self.scan is None or analysed.scan != self.scan.name:
             return
         self.scan.findings.add(analysed)
+        if analysed.jpeg is not None and analysed.detections:
+            frame = self.scan.findings.taken[analysed.number]
+            markers = sorted({one.marker for one in analysed.detections})
+            self.album.keep(frame.place, self.scan.spots.index(frame.spot), markers, frame.at, analysed.jpeg)
         if analysed.jpeg is not None and self.show:
             self._publish(topics.CAMERA_SCAN_IMAGE.message(analysed.jpeg, cam=self.config.name))
 

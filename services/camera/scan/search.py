@@ -24,7 +24,7 @@ from services.camera.scan.source import Source, Spot
 from services.errors import DeviceError
 from services.payloads import Place, ScanState
 
-ANALYSE_S = 30.0  # longest wait for the last frames to be looked at
+ANALYSE_S = 30.0  # longest wait for the next frame to be looked at
 LIGHT_S = 1.5  # after a change of the picture's mode it exposes anew: 1 to 2 s
 BACK_S = 180.0  # a camera that went away may be restarting: 40 to 105 s were seen
 PATIENCE = 3  # times that it may go away in one scan
@@ -92,12 +92,13 @@ class Scan:
     def state(
         self, state: Literal["running", "done", "cancelled", "failed"], now: float, reason: str = ""
     ) -> ScanState:
-        """How far it is."""
+        """How far it is; while it runs, what was seen in one frame only is not found yet."""
+        found = [one for one in self.findings.seen if state != "running" or self.findings.found(one)]
         return ScanState(
             state=state,
             scan=self.name,
             targets=list(self.findings.targets),
-            found=sorted(self.findings.seen),
+            found=sorted(found),
             turn=self.turn,
             place=self.place,
             progress=1.0 if state == "done" else self._progress(),
@@ -216,11 +217,13 @@ class Scan:
 
     def _all_there(self, now: float) -> Plan[float]:
         """Until every frame has come and has been looked at."""
-        limit = now + ANALYSE_S
+        limit, done = now + ANALYSE_S, self.findings.analysed
         self.gather()
         while self.source.pending(now) or self.findings.analysed < len(self.findings.taken):
+            if self.findings.analysed > done:
+                limit, done = now + ANALYSE_S, self.findings.analysed
             if now > limit:
-                raise Away("the frames were not looked at in time")
+                raise DeviceError("the frames are not looked at: no worker answers")
             now = yield from wait(now + STEP_S)
             self.gather()
         return now

@@ -6,7 +6,7 @@ The geometry is in `vision/pose.py` and `vision/frames.py`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import acos, atan2, cos, degrees, hypot, radians, sin
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from services.camera.requests import Reading
 from services.payloads import Point, Quaternion, ScanResult, WeightedQuaternion, stamp
 from services.vision.detect import Detection
-from services.vision.frames import Array, Kind, Mount, camera_in_apartment, quaternion
+from services.vision.frames import Array, Kind, Mount, axes_in_apartment, camera_in_apartment, quaternion
 from services.vision.lens import Lens
 from services.vision.pose import Located, View, locate_each
 from services.vision.prior import Prior
@@ -73,6 +73,7 @@ class Eye:
     widest: float = 0.0  # the zoom at which the lens was calibrated
     levels: tuple[Level, ...] = ()
     angle_noise_deg: float = 0.05  # standard deviation of a reading
+    mount_doubt: Array | None = None  # covariance (6, 6) of the mount's place (m) and turn (rad, apartment's axes)
 
     def magnification(self, seen: Sighting) -> Magnification | None:
         """Of the picture of a sighting: measured, or by the table; None where neither tells it well enough."""
@@ -139,19 +140,33 @@ def _located(eye: Eye, sought: Sought, seen: Sequence[Sighting]) -> tuple[Placed
         return [], f"how much zoom {seen[0].reading.zoom:g} magnifies is not known well enough to tell the distance"
     views = [_view(eye, eye.lens, eye.mount, sought, sighting, magnified) for sighting, magnified in measured]
     try:
-        return [(one, [sighting for sighting, _ in measured]) for one in locate_each(views, sought.prior)], None
+        found = [_hung(one, eye.mount, eye.mount_doubt) for one in locate_each(views, sought.prior)]
+        return [(one, [sighting for sighting, _ in measured]) for one in found], None
     except ValueError as error:
         return [], str(error)
 
 
+def _hung(located: Located, mount: Mount, doubt: Array | None) -> Located:
+    """With what the mount's own place and turn add: all sights share it, so no number of them takes it away."""
+    if doubt is None:
+        return located
+    x, y, z = located.position - np.array(mount.position)
+    moved = np.hstack((np.eye(3), [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]))  # the marker, by place and turn
+    return replace(located, covariance=located.covariance + moved @ doubt @ moved.T)
+
+
 def _view(eye: Eye, lens: Lens, mount: Mount, sought: Sought, sighting: Sighting, magnified: Magnification) -> View:
+    reading, zoomed = sighting.reading, magnified.through(lens.scaled(*sighting.size))
     return View(
-        lens=magnified.through(lens.scaled(*sighting.size)),
-        camera=camera_in_apartment(mount, sighting.reading.pan, sighting.reading.tilt),
+        lens=zoomed,
+        camera=camera_in_apartment(mount, reading.pan, reading.tilt),
         corners=np.asarray(sighting.detection.corners, float),
         size_m=sought.size_m,
         angle_noise_deg=eye.angle_noise_deg,
         focal_doubt=magnified.relative,
+        aside_deg=degrees(magnified.aside * zoomed.width / zoomed.focal),
+        enlarged=max(1.0, magnified.times),
+        axes=axes_in_apartment(mount, reading.pan, reading.tilt),
         at=sighting.at,
     )
 

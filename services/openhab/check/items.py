@@ -5,6 +5,7 @@ Not here: what only several files together show (`across.py`), and Alexa's metad
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -185,8 +186,11 @@ def _profile_fault(one: Metadata) -> str | None:
     parts = profile.split(":")
     if len(parts) > 2 or not all(patterns.SEGMENT.fullmatch(part) for part in parts):
         return f"expected a profile such as follow or transform:MAP, got {profile!r}"
-    if (len(parts) == 1 or parts[0] == "system") and parts[-1] not in PROFILES:
-        return f"expected a profile of OpenHAB's own, or <add-on>:<profile>, got {profile!r}"
+    near = difflib.get_close_matches(parts[-1], PROFILES, n=1, cutoff=0.8)
+    if (len(parts) == 1 or parts[0] == "system") and parts[-1] not in PROFILES and near:
+        return (
+            f"expected a profile of OpenHAB's own, or <add-on>:<profile>, got {profile!r} (did you mean {near[0]!r}?)"
+        )
     return None
 
 

@@ -14,9 +14,10 @@ CONVERSION = re.compile(
     r"%(?:unit%|%|n|(?:\d+\$|<)?[-#+ 0,(]*\d*(?:\.\d+)?(?:[tT][HIklMSLNpzZsQBbhAaCYyjmdeRTrDFc]|[bBhHsScCdoxXeEfgGaA]))"
 )
 TRANSFORM = re.compile(r"[A-Z0-9]+\([^()]*\):(.*)", re.S)
-OLD_EXPIRE = re.compile(r"(?:(\d+)h)?\s*(?:(\d+)m)?\s*(?:(\d+)s)?")
+OLD_EXPIRE = re.compile(r"(?:(\d+)h)?\s*(?:(\d+)m)?\s*(?:(\d+)s)?", re.I)
 WORDY_EXPIRE = re.compile(
-    r"(?:\d+\s*(?:d|days?)\s*)?(?:\d+\s*(?:h|hrs?|hours?)\s*)?(?:\d+\s*(?:m|mins?|minutes?)\s*)?(?:\d+\s*(?:s|secs?|seconds?))?"
+    r"(?:\d+\s*(?:d|days?)\s*)?(?:\d+\s*(?:h|hrs?|hours?)\s*)?(?:\d+\s*(?:m|mins?|minutes?)\s*)?(?:\d+\s*(?:s|secs?|seconds?))?",
+    re.I,
 )
 ISO_EXPIRE = re.compile(r"P(?!$)(?:\d+D)?(?:T(?=\d)(?:\d+H)?(?:\d+M)?(?:\d+(?:\.\d+)?S)?)?")
 SEGMENT = re.compile(r"[A-Za-z0-9_-]+")

@@ -9,3 +9,6 @@ CREATE TABLE IF NOT EXISTS summary (      -- numbers of an item in `width` secon
   item_id INT UNSIGNED NOT NULL, width INT UNSIGNED NOT NULL, start BIGINT NOT NULL,
   n INT UNSIGNED NOT NULL, lo DOUBLE NOT NULL, mean DOUBLE NOT NULL, hi DOUBLE NOT NULL, last DOUBLE NOT NULL,
   PRIMARY KEY (item_id, width, start)) ENGINE=InnoDB;
+
+CREATE TABLE IF NOT EXISTS mqtt_noted (   -- what a writer knows of its broker
+  client VARCHAR(64) NOT NULL, name VARCHAR(20) NOT NULL, value BIGINT NOT NULL, PRIMARY KEY (client, name)) ENGINE=InnoDB;

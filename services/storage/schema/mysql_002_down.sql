@@ -1,5 +1,6 @@
 -- Back to version 1, MariaDB and MySQL. The means are lost; raw rows are not touched.
 DROP TABLE IF EXISTS summary;
+DROP TABLE IF EXISTS mqtt_noted;
 DROP TABLE IF EXISTS mqtt_seen;
 
 CREATE TABLE IF NOT EXISTS mqtt_session (

@@ -9,3 +9,6 @@ CREATE TABLE summary (                    -- numbers of an item in `width` secon
   item_id INTEGER NOT NULL, width INTEGER NOT NULL, start INTEGER NOT NULL,
   n INTEGER NOT NULL, lo REAL NOT NULL, mean REAL NOT NULL, hi REAL NOT NULL, last REAL NOT NULL,
   PRIMARY KEY (item_id, width, start)) STRICT, WITHOUT ROWID;
+
+CREATE TABLE mqtt_noted (                 -- what a writer knows of its broker
+  client TEXT NOT NULL, name TEXT NOT NULL, value INTEGER NOT NULL, PRIMARY KEY (client, name)) STRICT, WITHOUT ROWID;

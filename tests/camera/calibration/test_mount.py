@@ -12,6 +12,7 @@ import pytest
 from services.camera.service import CameraService
 from services.virtual import VirtualApartment
 from services.vision.frames import Mount, camera_in_apartment
+from tests import bounds
 from tests.camera.calibration.showing import ordered, world_of
 from tests.camera.calibration.touring import calibrated, crooked_flat, mount_of, said_to_be
 from tests.vision.mount_trials import angle_deg
@@ -40,12 +41,12 @@ def test_five_markers_a_centimetre_off_give_the_mount_and_one_that_is_elsewhere_
     end, told = calibrated(flat, markers)
     assert (end.state, end.error) == ("done", None)
     found = mount_of(told[-1])
-    assert np.linalg.norm(np.subtract(found.position, truth.position)) <= 0.010
+    assert np.linalg.norm(np.subtract(found.position, truth.position)) <= bounds.MOUNT_M
     turns = [
         angle_deg(camera_in_apartment(found, pan, tilt), camera_in_apartment(truth, pan, tilt))
         for pan, tilt in ((0.0, 10.0), (120.0, 45.0), (240.0, 80.0))
     ]
-    assert max(turns) <= 0.3
+    assert max(turns) <= bounds.MOUNT_DEG
     assert told[-1].said == "not where they were said to be: 100"
     assert in_use(flat).position == pytest.approx(found.position, abs=1e-4)
     assert end.position is not None
@@ -68,7 +69,7 @@ def test_without_markers_there_is_no_mount(
     flat: VirtualApartment, markers: dict[str, list[float]], state: str, why: str
 ) -> None:
     def stops_the_search(told: object) -> None:
-        if getattr(told, "views", 0) >= 2:
+        if getattr(told, "views", 0) >= 1:
             flat.client.say("camera/ip1/order/Move", "Stop")
 
     old = in_use(flat)

@@ -1,130 +1,110 @@
-"""The zoom is learnt from the simulated camera's own pictures, in virtual time."""
+"""The zoom as an order, learnt from the simulated camera's own pictures in virtual time; its table and its file."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pytest
-from pydantic import SecretStr
 
-from services.camera.address import Address
-from services.camera.brands.amcrest import Amcrest
 from services.camera.calibration import levels
-from services.camera.calibration.zoom import Climb, Visit, table
-from services.camera.plan import Plan, Until, ask, wait
-from services.camera.ptz.goal import Limits
-from services.camera.ptz.skill import Skill
-from services.camera.requests import Refused, Reply, Snapshot
-from services.camera.video import pictures
-from services.camera.web.gate import Gate
-from services.errors import ConfigError, DeviceError
-from services.simulators.camera import Config
-from services.simulators.camera.motors import Pose, magnification
-from services.simulators.camera.program import inside
-from services.virtual.wire import Wire
+from services.camera.calibration.zoom import Visit, table
+from services.camera.service import CameraService
+from services.errors import ConfigError
+from services.payloads import Calibration, OrderResult
+from services.simulators.camera.motors import magnification
+from services.virtual import VirtualApartment
 from services.vision.lens import Lens
-from services.vision.zoom import WIDEST, Level, Magnification, at_level, measure
+from services.vision.zoom import WIDEST, Level, Magnification, at_level
 from tests import bounds
+from tests.camera.calibration.showing import ordered
+from tests.trials import virtual_flat
 
-CONFIG = Path(__file__).parents[3] / "config"
-START = 1000.0
+SIZE = {"Width": 1152, "Height": 648}  # of the stream: quicker to draw
 
 
-class Camera:
-    """The simulated camera, and a plan on it as the service runs it; `true` magnifications of the pictures taken."""
+@dataclass
+class Learnt:
+    """A calibration that has ended: `visits` holds the measured and the true magnification of each."""
 
-    def __init__(self) -> None:
-        settings = Config.model_validate({"folder": CONFIG, "user": "ros", "password": "secret123"})
-        self.behind = inside(settings, START)
-        self.wire, self.now = Wire(self.behind), START
-        for name, size in (("Width", 1152), ("Height", 648)):  # quicker to draw
-            self.behind.device.tables.fix(f"Encode[0].MainFormat[0].Video.{name}", str(size))
-        address = Address("http://192.0.2.9", "ros", SecretStr("secret123"))
-        self.client = Amcrest(address, self.wire, Gate(clock=lambda: self.now, pause=lambda seconds: None))
-        self.true: list[float] = []
+    flat: VirtualApartment
+    end: OrderResult | None = None
+    last: Calibration | None = None
+    visits: list[tuple[float, float]] = field(default_factory=list)
 
-    def run(self, plan: Plan[Any]) -> Any:
-        answer: Reply | float | None = None
-        while True:
-            try:
-                step = plan.send(answer)
-            except StopIteration as stop:
-                return stop.value
-            if isinstance(step, Until):
-                answer = self.now = max(self.now, step.at)
-            else:
-                self.wire.now, result, fault = self.now, None, None
-                try:
-                    result = self.client.send(step)
-                except DeviceError as error:
-                    fault = error
-                answer = Reply(step, 1, result, fault, self.now, self.wire.now)
-                self.now = self.wire.now
-
-    def look(self, now: float) -> Plan[tuple[bytes, float]]:
-        """A picture, and what it is truly magnified by."""
-        yield from wait(now + 0.6)
-        reply = yield from ask(Snapshot())
-        pose, _ = self.behind.device.motion(reply.received)
-        self.true.append(magnification(pose.zoom))
-        return reply.result, reply.received
-
-    def compare(self, wide: bytes, zoomed: bytes) -> Plan[tuple[Magnification, float]]:
-        try:
-            found = measure(pictures.decode(wide), pictures.decode(zoomed))
-        except ValueError as error:
-            raise Refused(str(error)) from error
-        return found, (yield from wait(self.now))
+    def hear(self, told: Calibration) -> None:
+        if measured := re.search(r": ([0-9.]+) times", told.said):
+            pose, _ = self.flat.insides["ip1"].device.motion(self.flat.now)
+            self.visits.append((float(measured[1]), magnification(pose.zoom)))
 
 
 @pytest.fixture(scope="module")
-def learnt() -> tuple[Camera, Climb, tuple[Level, ...]]:
-    camera = Camera()
-    camera.behind.device.place(Pose(327.0, 41.0, 0.0), START)
-    climb = Climb(Limits(), Skill(), camera.look, camera.compare, rounds=1)
-    return camera, climb, camera.run(climb.plan())
+def flat(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualApartment]:
+    with virtual_flat(tmp_path_factory.mktemp("zoom")) as flat:
+        for name, pixels in SIZE.items():
+            flat.insides["ip1"].device.tables.fix(f"Encode[0].MainFormat[0].Video.{name}", str(pixels))
+        yield flat
 
 
-def test_the_true_focal_length_of_every_visit_is_recovered(learnt: tuple[Camera, Climb, tuple[Level, ...]]) -> None:
-    camera, climb, _ = learnt
-    zoomed = [times for times in camera.true if times > 1.1]
-    assert len(climb.visits) == len(zoomed) == 8
-    for visit, true in zip(climb.visits, zoomed, strict=True):
-        assert abs(visit.seen.times / true - 1) < bounds.CALIBRATED_FOCAL
+@pytest.fixture(scope="module")
+def learnt(flat: VirtualApartment) -> Learnt:
+    flat.look("ip1", pan=327.0, tilt=41.0, zoom=0.0)
+    learnt = Learnt(flat)
+    learnt.end, told = ordered(flat, "CalibrateZoom", "True", learnt.hear)
+    learnt.last = told[-1]
+    return learnt
 
 
-def test_the_table_holds_what_a_level_is_magnified_by_and_how_surely(
-    learnt: tuple[Camera, Climb, tuple[Level, ...]],
-) -> None:
-    camera, _, found = learnt
+def test_the_true_focal_length_of_every_visit_is_recovered(learnt: Learnt) -> None:
+    assert learnt.end is not None
+    assert (learnt.end.state, learnt.end.error) == ("done", None)
+    assert len(learnt.visits) == 16
+    for measured, true in learnt.visits:
+        assert abs(measured / true - 1) < bounds.CALIBRATED_FOCAL
+
+
+def test_the_table_holds_every_level_s_focal_length_and_how_surely_and_is_in_use(learnt: Learnt) -> None:
+    service = next(one.service for one in learnt.flat.runners if isinstance(one.service, CameraService))
+    found, lens, last = service.scanner.eye.levels, service.scanner.eye.lens, learnt.last
     assert [level.zoom for level in found] == [0, 2, 4, 6, 8]
     assert found[0].seen == WIDEST
-    for true in camera.true:
+    for _, true in learnt.visits:
         level = min(found, key=lambda level: abs(level.seen.times - true))
         assert abs(level.seen.times - true) <= 3 * max(level.seen.sigma, 0.001)
+    assert last is not None
+    assert lens is not None
+    assert last.values["zoom 4"][0] == pytest.approx(lens.focal * found[2].seen.times)
+    assert last.file is not None
+    assert [level.zoom for level in levels.read(Path(last.file))] == [0, 2, 4, 6, 8]
 
 
-def test_the_camera_looks_where_it_did_before(learnt: tuple[Camera, Climb, tuple[Level, ...]]) -> None:
-    camera, _, _ = learnt
-    pose, _ = camera.behind.device.motion(camera.now)
-    assert abs(pose.pan - 327.0) < 0.5
-    assert abs(pose.tilt - 41.0) < 0.5
-    assert pose.zoom < 1.0
+def test_the_report_shows_what_each_visit_saw(learnt: Learnt) -> None:
+    assert learnt.last is not None
+    assert learnt.last.report is not None
+    page = Path(learnt.last.report).read_text(encoding="utf-8")
+    assert page.count("<polygon") == 16
+    assert "data:image/jpeg" in page
 
 
-def test_a_camera_that_shows_nothing_to_compare_is_refused_with_the_reason() -> None:
-    camera = Camera()
+def test_the_camera_looks_where_it_did_before(learnt: Learnt) -> None:
+    assert learnt.end is not None
+    position = learnt.end.position
+    assert position is not None
+    assert abs(position.pan - 327.0) < 0.6
+    assert abs(position.tilt - 41.0) < 0.6
+    assert position.zoom == 0.0
 
-    def look(now: float) -> Plan[tuple[bytes, float]]:
-        return b"", (yield from wait(now))
 
-    def nothing(wide: bytes, zoomed: bytes) -> Plan[tuple[Magnification, float]]:
-        yield from wait(camera.now)
-        raise Refused("too little in common")
-
-    with pytest.raises(Refused, match="could be compared with the wide one: too little in common"):
-        camera.run(Climb(Limits(), Skill(), look, nothing, rounds=1).plan())
+def test_a_camera_that_shows_nothing_to_compare_is_refused_with_the_reason(flat: VirtualApartment) -> None:
+    hidden = flat.order("ip1", "Privacy", "ON")
+    assert hidden is not None
+    assert hidden.state == "done", hidden
+    end, told = ordered(flat, "CalibrateZoom", "True")
+    assert end.state in ("refused", "failed")
+    assert "no zoomed picture could be compared with the wide one: the zoomed picture" in (end.error or "")
+    assert told[-1].state == "failed"
 
 
 def test_levels_that_scatter_are_unsure_and_those_that_do_not_are_sure() -> None:

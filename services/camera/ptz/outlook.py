@@ -1,0 +1,106 @@
+"""How long an axis will probably take from a place to its goal, with the commands that are left for it.
+
+A leg ends as late as an answer may: near a stop a fast one has to end early, and a slower one goes on; a leg that
+misses costs another one. Each takes commands, and those are counted: with few left, what surely ends is worth the
+time. Pure. Not here: both axes together, which is `leg.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import exp, log, sqrt
+
+from services.camera.ptz.pace import HALF_CHANGE, STOP_LATE, Pace
+from services.camera.ptz.skill import Skill
+
+NOISE_DEG = 0.05  # of a reading, beside what is learnt
+CORRECTION_S = 2.0  # a correction takes about so many answers, since it often begins without a reading
+LONG = 4.0  # answers: a leg as long as that is read in, which leaves part of the rate in doubt
+READ_ON_THE_WAY = 0.1
+CRAWL_DEG = 0.2  # so much of a goal may be given up for the fear of a late stop
+LEG = 3  # commands: a start, an end, a reading
+OVER_S = 15.0  # what it is worth to arrive with the commands that there are
+FINE = 6.0  # steps of distance in each factor of e
+
+
+@dataclass(frozen=True)
+class Way:
+    """What one axis has before it: the distance with its sign, and how much room there is behind its end."""
+
+    distance: float
+    room: float
+    pace: Pace
+
+
+@dataclass
+class Outlook:
+    """The same for every leg that is thought about at one time."""
+
+    ways: dict[int, Way]
+    skill: Skill
+    known: dict[tuple[int, int, int], float] = field(default_factory=dict)
+
+    def seconds(self, axis: int, distance: float, left: int) -> float:
+        """From rest at a distance (positive) until it is read to be there; `left` commands until then."""
+        if distance <= self.skill.near:
+            return 0.0
+        if left < LEG:
+            return OVER_S
+        step = round(FINE * log(distance))
+        key = (axis, step, left)
+        if key not in self.known:
+            self.known[key] = OVER_S  # until it is known better
+            self.known[key] = min(
+                self._leg(axis, exp(step / FINE), speed, left) for speed in self.ways[axis].pace.speeds
+            )
+        return self.known[key]
+
+    def _leg(self, axis: int, distance: float, speed: int, left: int) -> float:
+        way = self.ways[axis]
+        short = feared(way, speed, distance, self.skill)
+        if short >= distance and speed > 1:
+            return OVER_S
+        held = max(self.skill.timing.usual, held_for(way.pace, speed, distance - short))
+        left -= 0 if way.pace.known(speed) else 1  # it will be looked at
+        if short > self.skill.near:
+            return held + self.seconds(axis, short, left - 1)
+        spread = spread_of(way.pace, speed, held, self.skill)
+        correction = CORRECTION_S * self.skill.timing.usual + self.seconds(
+            axis, self.skill.near + spread / 2, left - LEG
+        )
+        return held + (1 - chance(-short, spread, self.skill.near)) * correction
+
+
+def feared(way: Way, speed: int, distance: float, skill: Skill) -> float:
+    """How far before the goal a leg has to end, since a late end would push against the stop behind it."""
+    held = held_for(way.pace, speed, distance)
+    fear = way.pace.rate(speed) * skill.timing.tail + 2 * doubt(way.pace, speed, held, skill)
+    short = max(0.0, fear - way.room)
+    return min(short, CRAWL_DEG) if speed == 1 else short
+
+
+def held_for(pace: Pace, speed: int, distance: float) -> float:
+    """How long from the effect of a start to that of its end for a distance (positive)."""
+    rate, slow = pace.rate(speed), 2 * pace.other(HALF_CHANGE)
+    if distance >= slow * rate * rate:
+        return distance / rate - pace.other(STOP_LATE)
+    return sqrt(max(0.0, distance) * slow) - pace.other(STOP_LATE)  # it never gets to its speed
+
+
+def spread_of(pace: Pace, speed: int, held: float, skill: Skill) -> float:
+    """How far from where it should a leg may end."""
+    return pace.rate(speed) * skill.timing.spread + doubt(pace, speed, held, skill) + NOISE_DEG
+
+
+def doubt(pace: Pace, speed: int, held: float, skill: Skill) -> float:
+    """How far a leg may go wrong for not knowing the rate; in a long one readings tell it on the way."""
+    doubt, long = pace.doubt(speed), LONG * skill.timing.usual
+    if held > long:
+        return min(doubt, READ_ON_THE_WAY * pace.rate(speed)) * long
+    return doubt * max(0.0, held)
+
+
+def chance(off: float, spread: float, near: float) -> float:
+    """How probable it is to end within what is good enough, when every end within the spread is equally so."""
+    low, high = max(off - spread, -near), min(off + spread, near)
+    return max(0.0, high - low) / (2 * spread)

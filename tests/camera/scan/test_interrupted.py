@@ -1,0 +1,138 @@
+"""A scan in trouble: it is cancelled, the camera restarts, the stream stands still, frames are broken."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from services.camera.scan.search import Scan
+from services.client import FINAL
+from tests.camera.scan.virtual_scan import Seer, VirtualScan, virtual_scan
+
+PLACES = ["Sofa", "TV", "Kitchen", "Dining"]
+ORDER = json.dumps({"full": True, "places": PLACES, "frames": 4})
+WHOLE = 2 * len(PLACES) * 4
+
+
+@pytest.fixture
+def trial(tmp_path: Path) -> Iterator[VirtualScan]:
+    with virtual_scan(tmp_path) as trial:
+        trial.sees({})
+        yield trial
+
+
+def once(condition: Callable[[Scan], bool], act: Callable[[], Any]) -> Callable[[Scan], None]:
+    """Does something when a condition holds for the first time."""
+    done: list[Any] = []
+
+    def each(scan: Scan) -> None:
+        if not done and condition(scan):
+            done.append(act())
+
+    return each
+
+
+def stands(trial: VirtualScan) -> bool:
+    return not any(trial.inside.device.motion(trial.flat.now)[1][:2])
+
+
+def answers(trial: VirtualScan) -> list[dict[str, Any]]:
+    """How orders ended."""
+    said = [json.loads(one.payload) for one in trial.flat.client.seen if one.topic == "camera/ip1/order_result"]
+    return [one for one in said if one["state"] in FINAL]
+
+
+@pytest.mark.parametrize("frames", [0, 5, 12, 20])
+def test_a_scan_is_cancelled_within_a_second_wherever_it_is(trial: VirtualScan, frames: int) -> None:
+    before = trial.inside.device.tables.colour
+    scan = trial.begin(ORDER)
+    assert trial.flat.until(lambda: len(scan.findings.taken) >= frames and not stands(trial), 60.0)
+    ordered = trial.flat.now
+    trial.flat.client.say("camera/ip1/order/Scan", "OFF")
+    assert trial.flat.until(lambda: stands(trial) and trial.service.scanner.scan is None, 1.0)
+    assert trial.flat.now - ordered <= 1.0
+    trial.flat.until(lambda: False, 12.0)
+    assert stands(trial)
+    assert trial.states()[-1].state == "cancelled"
+    assert {one["state"] for one in answers(trial)} == {"cancelled", "done"}
+    assert trial.inside.device.tables.colour == before
+
+
+def test_a_camera_that_restarts_is_awaited_and_the_scan_goes_on(trial: VirtualScan) -> None:
+    restart = once(
+        lambda scan: len(scan.findings.taken) >= 6 and not stands(trial),
+        lambda: trial.inside.device.reboot(trial.flat.now),
+    )
+    scan, seconds, last = trial.run(ORDER, restart)
+    assert (last.state, last.frames_analysed) == ("done", WHOLE)
+    assert seconds > 60.0, "it takes a minute to restart"
+    assert any("the camera is away" in state.reason for state in trial.states() if state.state == "running")
+    assert {spot.place for spot in scan.spots if spot.got} == set(PLACES)
+    assert stands(trial)
+
+
+def test_a_camera_that_stays_away_fails_the_scan_with_the_reason(trial: VirtualScan) -> None:
+    def gone() -> None:
+        trial.inside.device.boots_until = trial.flat.now + 1000.0
+
+    _, _, last = trial.run(ORDER, once(lambda scan: len(scan.findings.taken) >= 6, gone))
+    assert last.state == "failed"
+    assert "camera" in last.reason
+    assert [one["state"] for one in answers(trial)] == ["failed"]
+
+
+def test_a_stream_that_stands_still_is_replaced_by_snapshots(trial: VirtualScan) -> None:
+    def freeze() -> None:
+        trial.flat.films["ip1"].frozen = trial.flat.now
+
+    scan, _, last = trial.run(ORDER, once(lambda scan: len(scan.findings.taken) >= 6, freeze))
+    assert (last.state, last.frames_analysed) == ("done", WHOLE)
+    assert all(sum(spot.got for spot in scan.spots if spot.place == place) == 8 for place in PLACES)
+
+
+def test_places_whose_frames_are_broken_are_visited_once_more(trial: VirtualScan) -> None:
+    broken = range(5, 11)
+    trial.service.scanner.analyst = lambda: Seer(trial, {}, fails=lambda number: "no JPEG" if number in broken else "")
+    scan, _, last = trial.run(ORDER)
+    assert last.state == "done"
+    assert last.frames_analysed == WHOLE + len(broken)
+    assert all(sum(spot.got for spot in scan.spots if spot.place == place) == 8 for place in PLACES)
+
+
+def test_a_scan_of_which_nothing_can_be_read_fails_with_the_reason(trial: VirtualScan) -> None:
+    trial.service.scanner.analyst = lambda: Seer(trial, {}, fails=lambda number: "expected a whole JPEG")
+    _, _, last = trial.run(ORDER)
+    assert last.state == "failed"
+    assert "no picture of Sofa" in last.reason
+    assert "expected a whole JPEG" in last.reason
+
+
+def test_an_order_of_a_human_ends_the_scan_and_is_carried_out(trial: VirtualScan) -> None:
+    scan = trial.begin(ORDER)
+    assert trial.flat.until(lambda: len(scan.findings.taken) >= 6, 60.0)
+    trial.flat.client.say("camera/ip1/order/Goto", "Hall")
+    assert trial.flat.until(lambda: len(answers_now(trial)) == 2, 30.0)
+    assert [(one["key"], one["state"]) for one in answers_now(trial)] == [("Scan", "cancelled"), ("Goto", "done")]
+
+
+def answers_now(trial: VirtualScan) -> list[dict[str, Any]]:
+    trial.states()
+    return answers(trial)
+
+
+def test_the_picture_is_restored_by_the_next_life_of_a_service_that_was_killed(tmp_path: Path) -> None:
+    with virtual_scan(tmp_path / "one") as trial:
+        trial.sees({})
+        trial.begin(ORDER)
+        assert trial.flat.until(lambda: trial.inside.device.tables.colour == "bw", 60.0)
+        note = trial.service.scanner.modes.file
+        assert note is not None
+        kept = note.read_text(encoding="utf-8")
+    with virtual_scan(tmp_path / "two", note=kept) as trial:
+        tables = trial.inside.device.tables
+        assert trial.flat.until(lambda: tables.number("VideoColor[0][0].Contrast") == 50, 10.0)
+        assert tables.colour == "auto"

@@ -1,0 +1,87 @@
+"""How long a scan takes, beside the least time that motors and frames need, and beside the report's scan."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import mean
+
+import pytest
+
+from services.camera.scan.search import Scan
+from tests import bounds
+from tests.camera.scan.virtual_scan import VirtualScan, virtual_scan
+
+EVERY = 2 * 9 * 8
+
+
+@pytest.fixture
+def trial(tmp_path: Path) -> Iterator[VirtualScan]:
+    with virtual_scan(tmp_path) as trial:
+        yield trial
+
+
+def test_a_full_scan_takes_little_more_than_motors_and_frames_need_and_looks_at_every_frame_once(
+    trial: VirtualScan,
+) -> None:
+    trial.sees({})
+    ratios, factors = [], []
+    for _ in range(3):
+        least, (report, _) = trial.least(turns=2), trial.report()
+        scan, seconds, last = trial.run('{"full": true}')
+        assert (last.state, last.frames_taken, last.frames_analysed, last.progress) == ("done", EVERY, EVERY, 1.0)
+        assert sorted(frame.number for frame in scan.findings.taken) == list(range(EVERY))
+        assert {(spot.place, spot.mode) for spot in scan.spots} == {
+            (p, m) for p in trial.places for m in ("auto", "bw")
+        }
+        ratios.append(seconds / least.seconds)
+        factors.append(report / seconds)
+    assert mean(ratios) <= bounds.SCAN_OVER_LEAST, ratios
+    assert min(factors) >= bounds.SCAN_QUICKER, factors
+
+
+def test_a_target_is_seen_in_a_quarter_of_the_time_that_the_report_s_scan_needs(trial: VirtualScan) -> None:
+    markers = {number: (place.pan, place.tilt) for number, place in enumerate(trial.places.values(), 1)}
+    trial.sees(markers)
+    trial.run('{"full": true}')  # the motors are known, and where the camera's own presets lead
+    trial.service.scanner.seen_at.clear()
+    _, places = trial.report()
+    began, seen = trial.flat.now, {}
+
+    def each(scan: Scan) -> None:
+        for marker in markers:
+            if scan.findings.found(marker):
+                seen.setdefault(marker, trial.flat.now - began)
+
+    scan, _, last = trial.run('{"targets": [1, 2, 3, 4, 5, 6, 7, 8, 9], "frames": 4}', each)
+    assert last.state == "done"
+    shown = {marker: {one.place for one in seen} for marker, seen in scan.findings.seen.items()}
+    report = [min(places[place] for place in shown[marker]) for marker in markers]
+    assert mean(seen.values()) <= bounds.SIGHTING_SHARE * mean(report)
+
+
+def test_the_picture_is_as_it_was_after_a_scan_in_both_modes(trial: VirtualScan) -> None:
+    trial.sees({})
+    tables = trial.inside.device.tables
+    before = tables.read("VideoColor"), tables.colour
+    trial.run('{"full": true}')
+    assert (tables.read("VideoColor"), tables.colour) == before
+
+
+def test_only_where_the_first_turn_has_missed_a_target_there_is_a_second(trial: VirtualScan) -> None:
+    kitchen = trial.places["Kitchen"]
+    trial.sees({582: (kitchen.pan, kitchen.tilt)})
+    _, _, last = trial.run("ON")
+    assert (last.state, last.turn, last.found) == ("done", 1, [582])
+    _, _, last = trial.run('{"targets": [17], "places": ["Sofa", "Kitchen"]}')
+    assert (last.state, last.turn, last.found) == ("done", 2, [])
+    assert last.frames_taken == 2 * 2 * 8
+
+
+def test_progress_grows_and_ends_at_one(trial: VirtualScan) -> None:
+    trial.sees({})
+    trial.run('{"full": true, "places": ["Sofa", "TV", "Kitchen"]}')
+    progress = [state.progress for state in trial.states()]
+    assert progress == sorted(progress)
+    assert progress[-1] == 1.0
+    assert len(set(progress)) > 8

@@ -1,0 +1,106 @@
+"""Old samples become means, in pieces, and questions get the same answers from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from pydantic import ValidationError
+
+from services.history import Config
+from services.history.keeping import Keep, by_item, pieces
+from services.history.service import PAUSE_S, ROUND_EVERY_S, SETTLE_S, History
+from services.home import Home
+from services.home import Item as HomeItem
+from services.storage import Batch, Item, Sample, Storage, keeping, open_storage, reading
+from tests.databases import Database
+
+DAY = 86_400
+T0 = 1_769_817_600  # 2026-01-31 00:00 UTC
+US = 1_000_000
+HOME = Home(groups={"gAll": "All"}, items={
+    "Temp": HomeItem(type="Number", label="T", groups=("gAll",)), "Light": HomeItem(type="Switch", label="L"),
+})  # fmt: skip
+LINE = Keep(items=("gAll*", "Light"), raw="2d", means={"5m": "5d", "1h": "forever"})
+LINES = by_item((LINE,), HOME)
+
+
+@pytest.fixture
+def storage(database: Database) -> Iterator[Storage]:
+    """Ten days of a sample a minute, and a light that was switched once."""
+    opened = open_storage(database.address)
+    opened.add_items([Item("Temp", "Number", "°C"), Item("Light", "Switch")])
+    times = range(T0, T0 + 10 * DAY, 60)
+    opened.write(Batch([Sample("Temp", t * US, float(t // 60 % 100), None) for t in times]))
+    opened.write(Batch([Sample("Light", T0 * US, 1.0, "ON"), Sample("Temp", (T0 + 30) * US, None, "UNDEF")]))
+    yield opened
+    opened.close()
+
+
+def count(storage: Storage, table: str, where: str = "1=1") -> int:
+    return int(storage.read(f"SELECT COUNT(*) FROM {table} WHERE {where}")[0][0])
+
+
+def test_a_round_leaves_what_the_lines_say_and_the_same_answers(storage: Storage) -> None:
+    temp, now = storage.items["Temp"], T0 + 10 * DAY
+    before = reading.buckets(storage, temp, T0 * US, now * US, 3600)
+    steps = list(pieces(storage, LINES, now))
+    assert max(steps) <= 2000
+    assert count(storage, "summary", "width=300") == (5 * DAY - 300) // 300
+    assert count(storage, "summary", "width=3600") == 10 * 24 - 1
+    assert [one.time // US for one in storage.samples("Temp")] == list(range(T0 + 8 * DAY, T0 + 10 * DAY, 60))
+    assert len(storage.samples("Light")) == 1
+    after = reading.buckets(storage, temp, T0 * US, now * US, 3600)
+    assert [(b.start, b.n, b.lo, round(b.mean, 9), b.hi) for b in after] == [
+        (b.start, b.n, b.lo, round(b.mean, 9), b.hi) for b in before
+    ]
+    day = reading.buckets(storage, temp, (T0 + 6 * DAY) * US, (T0 + 7 * DAY) * US, 300)
+    assert len(day) == 288
+    assert list(pieces(storage, LINES, now)) == [0]  # a second round has nothing to do
+
+
+def test_the_last_of_an_interval_and_a_gap_are_kept(storage: Storage) -> None:
+    temp = storage.items["Temp"]
+    storage.write(Batch([Sample("Temp", (T0 + 40 * DAY) * US, 7.0, None)]))
+    list(pieces(storage, LINES, T0 + 50 * DAY))
+    assert storage.read(f"SELECT last FROM summary WHERE width=3600 AND start={T0}") == [
+        (float((T0 + 3540) // 60 % 100),)
+    ]
+    assert keeping.ends(storage, temp, 3600) == T0 + 40 * DAY + 3600
+    assert [one.num for one in storage.samples("Temp")] == [7.0]  # older than all, and yet the newest
+
+
+def test_what_may_still_come_late_is_not_closed(storage: Storage) -> None:
+    list(pieces(storage, LINES, T0 + 10 * DAY))
+    assert keeping.ends(storage, storage.items["Temp"], 300) == T0 + 10 * DAY - 300
+
+
+def test_the_service_keeps_house_in_pieces_between_questions(storage: Storage, database: Database) -> None:
+    service = History(lambda: open_storage(database.address), LINES)
+    now = float(T0 + 10 * DAY)
+    service.tick(now)
+    assert service.due == now + SETTLE_S
+    ticks = 0
+    while service.due is not None and service.due - now < ROUND_EVERY_S:
+        assert service.due - now in (SETTLE_S, pytest.approx(PAUSE_S, abs=1e-6))
+        now = service.due
+        service.tick(now)
+        ticks += 1
+    assert service.counters["pieces"] == ticks - 1 > 20
+    assert len(storage.samples("Temp")) <= 2 * DAY // 60
+    service.close()
+
+
+@pytest.mark.parametrize(
+    ("keep", "told"),
+    [
+        ({"items": ["Nothing"], "raw": "1d"}, "expected an item"),
+        ({"items": ["*"], "raw": "soon"}, "expected a length"),
+        ({"items": ["*"], "raw": "0d"}, "expected a length"),
+        ({"items": ["*"], "raw": "1d", "means": {"1h": "5m"}}, "expected a longer time than 1h"),
+        ({"items": [], "raw": "1d"}, "at least 1 item"),
+    ],
+)
+def test_a_line_that_cannot_be_kept_is_told(keep: dict[str, object], told: str) -> None:
+    with pytest.raises(ValidationError, match=told):
+        Config.model_validate({"url": "sqlite:///x.db", "home": HOME, "keep": [keep]})

@@ -1,0 +1,289 @@
+"""Figures of the writer for `make bench`: how fast it stores, beside subscribers that only acknowledge; and latencies.
+
+All of it is QoS 1 over MQTT 3.1.1, a commit before each acknowledgement, 1,000 items, on a real broker and database.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import random
+import socket
+import statistics
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import paho.mqtt.client as paho
+
+from services.aside import Aside
+from services.bus.connection import Address as BusAddress
+from services.bus.mqtt import MqttBus
+from services.home import Home, Item
+from services.peers import mariadb, mosquitto
+from services.persistence import Config
+from services.persistence.service import Persistence
+from services.runner import Runner
+from services.storage import Address, Batch, Storage, open_storage, read_address
+
+ITEMS = 1000
+WINDOW = 500  # of the publisher, and of the acknowledgements of the second floor
+HOME = Home(items={f"I{n}": Item(type="Number", label="I", persist=("everyUpdate",)) for n in range(ITEMS)})
+FILTER = "home/+/state"
+Go = Callable[[], None]
+
+
+@dataclass
+class Row:
+    """One figure; `ratio` is `value` over `floor`, where there is one."""
+
+    name: str
+    unit: str
+    value: float
+    floor: float | None = None
+    floor_is: str = ""
+    wanted: str = ""
+
+    @property
+    def ratio(self) -> float | None:
+        return self.value / self.floor if self.floor else None
+
+
+def publish(port: int, count: int, rate: float, start: Any) -> None:
+    """A process of its own: so many messages over a bare socket; as fast as they are taken, or `rate` a second.
+
+    Each says when it was sent, in seconds.
+    """
+    with socket.create_connection(("127.0.0.1", port)) as link:
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        link.sendall(b"\x10\x10\x00\x04MQTT\x04\x02\x00\x3c\x00\x04fast")
+        assert link.recv(4)[3] == 0, "refused"
+        start.wait()
+        due, burst = time.monotonic(), 1 if rate else WINDOW
+        for first in range(0, count, burst):
+            if rate:
+                due += random.expovariate(rate)
+                threading.Event().wait(max(0.0, due - time.monotonic()))
+            link.sendall(b"".join(_packet(number) for number in range(first, min(first + burst, count))))
+            taken = 0
+            while taken < 4 * min(burst, count - first):
+                taken += len(link.recv(65536))
+        link.sendall(b"\xe0\x00")
+
+
+def _packet(number: int) -> bytes:
+    topic = f"home/I{number % ITEMS}/state".encode()
+    body = (
+        len(topic).to_bytes(2, "big") + topic + (number % 65535 + 1).to_bytes(2, "big") + f"{time.time():.6f}".encode()
+    )
+    return b"\x32" + bytes([len(body)]) + body
+
+
+@contextmanager
+def publishing(port: int, count: int, rate: float = 0.0) -> Iterator[Go]:
+    """A publisher that begins when it is told to, and has ended with the block."""
+    context = multiprocessing.get_context("spawn")
+    start = context.Event()
+    process = context.Process(target=publish, args=(port, count, rate, start), daemon=True)
+    process.start()
+    yield start.set
+    process.join(300)
+
+
+def bare(port: int, count: int, *, together: int, backlog: bool) -> float:
+    """A floor: paho, which acknowledges each message, or so many at once. Messages per second."""
+    name, done, times, seen = f"bare{together}", threading.Event(), [0.0], [0]
+    held: list[int] = []
+    client = _bare_client(name, together)
+
+    def on_message(_client: Any, _data: Any, message: Any) -> None:
+        if not seen[0]:
+            times[0] = time.perf_counter()
+        seen[0] += 1
+        if together > 1:
+            held.append(message.mid)
+            if len(held) == together or seen[0] == count:
+                for mid in held:
+                    client.ack(mid, 1)
+                held.clear()
+        if seen[0] == count:
+            times.append(time.perf_counter())
+            done.set()
+
+    if backlog:
+        _subscribe_and_leave(port, name)
+        with publishing(port, count) as go:
+            go()
+        client.on_message = on_message
+        client.connect("127.0.0.1", port)
+        client.loop_start()
+        assert done.wait(300), f"only {seen[0]} of {count} came"
+    else:
+        client.on_message = on_message
+        with publishing(port, count) as go:
+            client.on_subscribe = lambda *_: go()
+            client.connect("127.0.0.1", port)
+            client.subscribe(FILTER, 1)
+            client.loop_start()
+            assert done.wait(300), f"only {seen[0]} of {count} came"
+    client.disconnect()
+    client.loop_stop()
+    return (count - 1) / (times[1] - times[0])
+
+
+def _bare_client(name: str, together: int) -> paho.Client:
+    return paho.Client(
+        paho.CallbackAPIVersion.VERSION2, client_id=name, clean_session=False, manual_ack=together > 1, protocol=4
+    )
+
+
+def _subscribe_and_leave(port: int, name: str) -> None:
+    """A session that the broker keeps."""
+    there = threading.Event()
+    client = paho.Client(paho.CallbackAPIVersion.VERSION2, client_id=name, clean_session=False, protocol=4)
+    client.on_subscribe = lambda *_: there.set()
+    client.connect("127.0.0.1", port)
+    client.subscribe(FILTER, 1)
+    client.loop_start()
+    assert there.wait(10)
+    client.disconnect()
+    client.loop_stop()
+
+
+class Timed:
+    """A storage that notes how old each number (the time when it was sent) is once it is committed."""
+
+    def __init__(self, real: Storage) -> None:
+        self.real = real
+        self.ages: list[float] = []
+
+    def write(self, batch: Batch) -> None:
+        self.real.write(batch)
+        now = time.time()
+        self.ages += [now - sample.num for sample in batch.samples if sample.num]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.real, name)
+
+
+class Writer:
+    """The service under its runner; `run` turns until so many rows are written."""
+
+    def __init__(self, port: int, address: Address) -> None:
+        self.storage = Timed(open_storage(address))
+        self.storage.add_items(_stored())
+        self.service = Persistence(Config(url="sqlite:///unused", home=HOME), lambda: self.storage)  # type: ignore[arg-type,return-value]
+        self.bus = MqttBus(BusAddress("writer", port=port, protocol=4, durable=True))
+        self.runner = Runner("writer", self.service, self.bus, time.time, Aside(None))
+
+    def connect(self) -> None:
+        while not self.bus.connected:
+            self.runner.turn(0.05)
+        self.runner.turn(0.2)
+
+    def run(self, count: int) -> tuple[float, float]:
+        """Rows per second from the first to the last, and CPU seconds of this process."""
+        counters = self.service.counters
+        while not counters["rows"]:
+            self.runner.turn(0.05)
+        first, already, cpu = time.perf_counter(), counters["rows"], time.process_time()
+        while counters["rows"] < count:
+            self.runner.turn(0.05)
+        return (count - already) / (time.perf_counter() - first), time.process_time() - cpu
+
+    def close(self) -> None:
+        self.bus.close()
+        self.service.connection.close()
+
+
+def _stored() -> list[Any]:
+    from services.storage import Item as Stored
+
+    return [Stored(name, "Number") for name in HOME.items]
+
+
+def stores(port: int, address: Address, count: int, *, backlog: bool) -> tuple[float, float]:
+    """Our writer: messages per second until they are committed, and CPU microseconds per message."""
+    if backlog:
+        _subscribe_and_leave(port, "writer")
+        with publishing(port, count) as go:
+            go()
+        writer = Writer(port, address)
+        rate, cpu = writer.run(count)
+    else:
+        writer = Writer(port, address)
+        writer.connect()
+        with publishing(port, count) as go:
+            go()
+            rate, cpu = writer.run(count)
+    writer.close()
+    return rate, cpu / count * 1e6
+
+
+def latency(port: int, address: Address, rate: float, seconds: float) -> tuple[float, float]:
+    """From being sent to being committed, milliseconds: median and 99th percentile."""
+    writer, count = Writer(port, address), int(rate * seconds)
+    writer.connect()
+    with publishing(port, count, rate) as go:
+        go()
+        writer.run(count)
+    ages = sorted(writer.storage.ages)
+    writer.close()
+    return 1000 * statistics.median(ages), 1000 * ages[int(len(ages) * 0.99)]
+
+
+def rows(folder: Path, runs: int, messages: int) -> list[Row]:
+    """All figures, medians of interleaved runs."""
+    found: dict[str, list[float]] = {}
+    folder.mkdir(parents=True, exist_ok=True)
+
+    def note(name: str, *values: float) -> None:
+        for number, value in enumerate(values):
+            found.setdefault(f"{name}/{number}", []).append(value)
+
+    with ExitStack() as stack:
+        server = stack.enter_context(mariadb.private(folder / "mariadb"))
+        for run in range(runs):
+            addresses = {"MariaDB": read_address(server.url, password=server.password),
+                         "SQLite": read_address(f"sqlite:///{folder}/bus{run}.db")}  # fmt: skip
+            for backlog in (True, False):
+                for together in (1, 500):
+                    with mosquitto.private(folder / f"m{run}{backlog}{together}", anonymous=True) as broker:
+                        note(
+                            f"bare{together}{backlog}", bare(broker.port, messages, together=together, backlog=backlog)
+                        )
+                for name, address in addresses.items():
+                    with mosquitto.private(folder / f"m{run}{backlog}{name}", anonymous=True) as broker:
+                        note(f"{name}{backlog}", *stores(broker.port, address, messages, backlog=backlog))
+            for rate in (100, 1000):
+                with mosquitto.private(folder / f"m{run}{rate}", anonymous=True) as broker:
+                    note(f"latency{rate}", *latency(broker.port, addresses["MariaDB"], rate, 5.0))
+    return _table({name: statistics.median(values) for name, values in found.items()})
+
+
+def _table(f: dict[str, float]) -> list[Row]:
+    each, batched = "bare paho, an ack each, the same way", "bare paho, acks by 500, the same way"
+    made = [Row("floor: bare paho draining, acks by 500", "msg/s", f["bare500True/0"]),
+            Row("floor: bare paho live, an ack each", "msg/s", f["bare1False/0"])]  # fmt: skip
+    for name in ("MariaDB", "SQLite"):
+        made += [
+            Row(
+                f"{name}: drains a backlog",
+                "msg/s",
+                f[f"{name}True/0"],
+                f["bare500True/0"],
+                batched,
+                ">= 0.5, goal 0.6",
+            ),
+            Row(f"{name}: drains a backlog", "msg/s", f[f"{name}True/0"], f["bare1True/0"], each),
+            Row(f"{name}: live flat out", "msg/s", f[f"{name}False/0"], f["bare1False/0"], each, ">= 0.9, goal 1.0"),
+            Row(f"{name}: CPU, draining", "us/msg", f[f"{name}True/1"]),
+        ]
+    for rate in (100, 1000):
+        made += [Row(f"publish to commit at {rate}/s, median", "ms", f[f"latency{rate}/0"]),
+                 Row(f"publish to commit at {rate}/s, 99 %", "ms", f[f"latency{rate}/1"],
+                     wanted="<= 10" if rate == 1000 else "")]  # fmt: skip
+    return made
