@@ -21,7 +21,7 @@ soak: $(VENV)/dev.stamp
 	@$(VENV)/bin/python -m tests.soak --part $(PART) --turns $(N) --seed $(SEED)
 
 bench: $(VENV)/dev.stamp
-	@$(VENV)/bin/python -m tests.bench $(ARGS)
+	@$(VENV)/bin/python -m tests.bench --part $(PART) $(ARGS)
 
 lint: $(VENV)/dev.stamp
 	$(VENV)/bin/ruff format --check .

@@ -32,6 +32,7 @@ from services.runner import Runner
 from tests.bridge import bench as bridge_bench
 from tests.camera import goal_figures, scan_figures
 from tests.persistence import figures as writer_figures
+from tests.vision import bench as vision_bench
 
 MESSAGES = 20_000
 STORED = 200_000  # messages of a backlog, and live, for the writer
@@ -149,6 +150,9 @@ def rates(port: int, protocol: int, run: Callable[[int, int, Callable[[], None]]
     return rate
 
 
+Part = tuple[Table, list[Any]]  # what people see of a part, and the same for programs
+
+
 def bus_and_runner(folder: Path, runs: int) -> list[Figure]:
     """QoS 1 through the bus, the runner and a service that does nothing, over MQTT 3.1.1 and 5."""
     figures = []
@@ -162,34 +166,71 @@ def bus_and_runner(folder: Path, runs: int) -> list[Figure]:
     return figures
 
 
-def main() -> None:
-    """Runs all, prints the table, writes `bench.json`."""
-    arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("--runs", type=int, default=RUNS, help="runs of each; the median counts")
-    arguments.add_argument("--json", type=Path, default=Path("bench.json"))
-    given = arguments.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        figures = bus_and_runner(Path(folder), given.runs)
-        stored = writer_figures.rows(Path(folder) / "writer", given.runs, STORED)
+def bus_part(folder: Path, runs: int) -> Part:
+    """The bus and the runner."""
+    figures = bus_and_runner(folder, runs)
     table = Table("figure", "value", "floor", "ratio", "wanted", "the floor is")
     for figure in figures:
         table.add_row(figure.name, f"{figure.value:,.0f} {figure.unit}", f"{figure.floor:,.0f} {figure.unit}",
                       f"{figure.ratio:.2f}", f">= {figure.wanted}", figure.floor_is)  # fmt: skip
-    Console(width=None if sys.stdout.isatty() else 170).print(table)
-    Console(width=None if sys.stdout.isatty() else 170).print(writer_table(stored))
-    moves = goal_figures.rows()
-    Console(width=None if sys.stdout.isatty() else 170).print(goals_table(moves))
-    bridged = list(bridge_bench.rows())
-    Console(width=None if sys.stdout.isatty() else 170).print(bridge_bench.table(bridged))
-    scans = scan_figures.rows()
-    Console(width=None if sys.stdout.isatty() else 170).print(scan_figures.table(scans))
-    figured = [{**asdict(figure), "ratio": figure.ratio} for figure in figures]
-    given.json.write_text(
-        json.dumps(
-            [*figured, *map(asdict, stored), *map(asdict, moves), *map(asdict, bridged), *scan_figures.plain(scans)],
-            indent=1,
-        )
-    )
+    return table, [{**asdict(figure), "ratio": figure.ratio} for figure in figures]
+
+
+def stored_part(folder: Path, runs: int) -> Part:
+    """Persistence."""
+    rows = writer_figures.rows(folder / "writer", runs, STORED)
+    return writer_table(rows), [asdict(row) for row in rows]
+
+
+def moves_part(_: Path, __: int) -> Part:
+    """The camera's goals."""
+    rows = goal_figures.rows()
+    return goals_table(rows), [asdict(row) for row in rows]
+
+
+def bridge_part(_: Path, __: int) -> Part:
+    """The bridge to ROS."""
+    rows = list(bridge_bench.rows())
+    return bridge_bench.table(rows), [asdict(row) for row in rows]
+
+
+def scan_part(_: Path, __: int) -> Part:
+    """Scans of the flat."""
+    rows = scan_figures.rows()
+    return scan_figures.table(rows), list(scan_figures.plain(rows))
+
+
+def vision_part(_: Path, __: int) -> Part:
+    """Markers in pictures."""
+    rows = list(vision_bench.rows())
+    return vision_bench.table(rows), [asdict(row) for row in rows]
+
+
+PARTS: dict[str, Callable[[Path, int], Part]] = {
+    "bus": bus_part,
+    "persistence": stored_part,
+    "moves": moves_part,
+    "bridge": bridge_part,
+    "scan": scan_part,
+    "vision": vision_part,
+}
+
+
+def main() -> None:
+    """Runs all parts or one, prints their tables, writes `bench.json`."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--part", choices=["all", *PARTS], default="all")
+    arguments.add_argument("--runs", type=int, default=RUNS, help="runs of each; the median counts")
+    arguments.add_argument("--json", type=Path, default=Path("bench.json"))
+    given = arguments.parse_args()
+    console = Console(width=None if sys.stdout.isatty() else 170)
+    plain: list[Any] = []
+    for name in PARTS if given.part == "all" else [given.part]:
+        with tempfile.TemporaryDirectory() as folder:
+            table, rows = PARTS[name](Path(folder), given.runs)
+        console.print(table)
+        plain += rows
+        given.json.write_text(json.dumps(plain, indent=1))
 
 
 def writer_table(rows: list[writer_figures.Row]) -> Table:

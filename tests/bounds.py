@@ -1,4 +1,4 @@
-"""The bounds that the issues name: of moves and of markers' places. Tests hold to them, bench and soak print them."""
+"""The bounds that the issues name: of moves, markers and places. Tests hold to them, bench and soak print them."""
 
 from __future__ import annotations
 
@@ -25,3 +25,11 @@ INSIDE, INSIDE_BY = 0.90, 0.05  # of the errors in the 90 % ellipsoid
 CALIBRATED_FOCAL = 0.005  # share by which a calibrated level's focal length is off at most
 LENS = 0.005  # share by which a calibrated lens's focal lengths are off at most
 MOUNT_M, MOUNT_DEG = 0.010, 0.3  # a calibrated mount, median, from five markers that were put a centimetre beside
+
+# Markers in pictures.
+RECALL = 0.985  # of the markers, for each side from SMALLEST_PX on, blur 1 and noise 5
+SMALLEST_PX = 19
+DARK_RECALL = 0.95  # of markers of 21 px in eight frames, grey levels 60 and 25, noise 6
+CORNER_PX = 0.10  # mean error of a corner at 30 px
+PER_MEGAPIXEL_MS = 35.0
+PLACE_MS = 150.0  # eight frames of 2304x1296 with the target in them, on two cores

@@ -28,6 +28,7 @@ from tests.camera.scan.scenes import scan_a_scene
 from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
 from tests.vision import mount_trials, positions
+from tests.vision import trials as detector_trials
 
 LONGEST_S = 600.0
 HANGING = ("a", "b", "c", "d")
@@ -146,6 +147,7 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
     "calibration": (mount_trials.calibrations, 150, "mm off, of the mount"),
     "scenes": (lambda: nullcontext(lambda rng: scan_a_scene(rng)), 24, "s, virtual"),
+    "detector": (detector_trials.in_numbers, 100, "false markers in 50 frames"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 

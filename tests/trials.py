@@ -149,10 +149,17 @@ def counters(bus: Client, name: str, bad: float) -> dict[str, float]:
 
 def rubbish_topic(rng: random.Random) -> str:
     row = rng.choice([row for row in topics.TABLE if row.payload is not bytes])
-    levels = {"cam": rng.choice(["ip1", "ip2", "x" * 50]), "service": rng.choice(["nobody", "a-b"]), "component": "x/y",
-              "item": rng.choice(["Kitchen_Light", "Hall_Dimmer", "No_Such_Item", "Lamp_Color"]),
-              "key": rng.choice(["Goto", "Scan", "Nonsense"]), "marker": str(rng.randrange(2000)),
-              "platform": "sensor", "entity": "x"}  # fmt: skip
+    levels = {
+        "cam": rng.choice(["ip1", "ip2", "x" * 50]),
+        "service": rng.choice(["nobody", "a-b"]),
+        "component": "x/y",
+        "item": rng.choice(["Kitchen_Light", "Hall_Dimmer", "No_Such_Item", "Lamp_Color"]),
+        "key": rng.choice(["Goto", "Scan", "Nonsense"]),
+        "marker": str(rng.randrange(2000)),
+        "robot": rng.choice(["tiago", "nobody"]),
+        "attribute": "$state",
+        **dict.fromkeys(("platform", "entity", "id", "device", "node", "property"), "x"),
+    }
     return re.sub(r"<(\w+)>", lambda m: levels[m[1]], row.pattern) + rng.choice(["", "", "", "/more", "é"])
 
 

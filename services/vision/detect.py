@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from services.vision import belief, codes, reading
 from services.vision.codes import DICTIONARIES, Book
 from services.vision.corners import refine, refine_many
-from services.vision.squares import WINDOW, noise, squares
+from services.vision.squares import noise, squares
 
 __all__ = ["DICTIONARIES", "Detection", "detect"]
 
@@ -28,12 +28,13 @@ SMALLEST_PX = 10.0  # side of the squares looked for; below 12 or so nothing can
 SMALLEST_HALVED_PX = 16.0  # the same in a picture that was shrunk: smaller ones are in the one before
 LEAST_PICTURE_PX = 110  # a picture with a shorter side than twice this is not shrunk
 MOST_HALVINGS = 4
-CLOSER_WINDOWS = (3, 23)  # px: a shadow's edge needs a narrow one, a border amid texture a wide one
-FAINT = 1.5  # grey levels: the step where nothing else was found, in a picture that was smoothed
-ENLARGED_PX = 4_500_000  # pictures with more pixels are not enlarged
-NEAR = 0.35  # of a side: squares whose middles are nearer are looks at the same thing
-LOOKS = 4  # at the same thing that are weighed
-HOPEFUL = 6.0  # belief of a square that is worth another look
+WIDE_WINDOW = 15  # px, in a picture that was shrunk: the border of a blurred marker, or one amid texture
+OTHER_WINDOWS = (3, 23)  # px: a shadow's edge needs a narrow one
+PART_WINDOWS = (9, 23)  # px, in an enlarged part
+ENLARGED_PX = 80.0  # a doubtful square's side is enlarged to about this, if it is smaller
+FAINT = 2.0  # grey levels: the threshold's step in an enlarged part
+HOPEFUL = 4.0  # belief of a square that is worth another look
+MOST_DOUBTFUL = 8  # of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +52,8 @@ class Detection:
 def detect(image: Picture, dictionary: str, targets: Collection[int] | None = None) -> list[Detection]:
     """Every marker of the dictionary (`DICT_5X5_1000`, ...) in the picture, or only the targets; best first.
 
-    `image` is grey (h, w) or BGR (h, w, 3). A marker shown twice is returned twice. When a target is missing, or
-    something looks like a marker that could not be read, a slower look follows. ValueError for an unknown
+    `image` is grey (h, w) or BGR (h, w, 3). A marker shown twice is returned twice. Where something looks like a
+    marker that could not be read, a slower look follows. ValueError for an unknown
     dictionary, a target that is not in it, or another kind of picture.
     """
     book, grey = codes.book(dictionary), _grey(image)
@@ -122,36 +123,46 @@ class _Search:
     def first(self) -> Iterator[tuple[_Look, Array]]:
         """The picture and smaller ones: each with its rough squares."""
         for look in self.looks:
-            yield look, squares(look.grey, SMALLEST_PX if look.scale == 1 else SMALLEST_HALVED_PX)
+            whole = look.scale == 1
+            yield look, squares(look.grey, SMALLEST_PX if whole else SMALLEST_HALVED_PX)
+            if not whole:
+                yield look, squares(look.grey, SMALLEST_HALVED_PX, window=WIDE_WINDOW)
 
     def closer(self) -> Iterator[tuple[_Look, Array]]:
-        """Slower looks: with other windows, smoothed for faint ones, enlarged for small ones."""
-        for look in self.looks[:2]:
-            for window in CLOSER_WINDOWS:
-                yield look, squares(look.grey, SMALLEST_PX, window=window)
-        look = self.looks[0]
-        smooth = np.asarray(cv2.GaussianBlur(look.grey, (0, 0), 1.0), np.uint8)
-        yield look, squares(smooth, SMALLEST_PX, window=WINDOW + 2, step=FAINT)
-        if look.grey.size <= ENLARGED_PX:
-            twice = cv2.resize(look.grey, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
-            large = _Look(np.asarray(twice, np.uint8), 2.0, look.noise)
-            found = squares(large.grey, 2 * SMALLEST_PX, window=WINDOW + 2)
-            yield look, large.back(found)
+        """Slower looks where something may be: enlarged, with other windows; everywhere if there is nothing at all."""
+        for one in self._doubtful()[:MOST_DOUBTFUL]:
+            part, corner = _part(self.looks[0].grey, one.corners)
+            larger = float(np.clip(ENLARGED_PX / _longest(one.corners), 1.0, 3.0))
+            grey = cv2.resize(part, None, fx=larger, fy=larger, interpolation=cv2.INTER_CUBIC)
+            look = _Look(np.asarray(grey, np.uint8), larger, self.looks[0].noise)
+            for window in PART_WINDOWS:
+                found = squares(look.grey, larger * SMALLEST_PX, window=window, step=FAINT)
+                yield self.looks[0], look.back(found) + corner
+        if self.wanted is None and not self.believed:
+            for window in OTHER_WINDOWS:
+                yield self.looks[0], squares(self.looks[0].grey, SMALLEST_PX, window=window)
 
     def worth_more(self) -> bool:
-        """Whether a target is missing, or something looks like a marker and could not be read."""
-        if self.wanted is not None:
-            return not self.wanted <= {one.marker for one in self.believed}
-        doubtful = (one for one in self.candidates if one.belief > HOPEFUL)
-        return any(not any(_near(one, other) for other in self.believed) for one in doubtful)
+        """Whether something looks like a marker that could not be read, and is wanted."""
+        return bool(self._doubtful())
+
+    def _doubtful(self) -> list[_Candidate]:
+        """The best of what may be markers that are wanted, each once."""
+        doubtful: list[_Candidate] = []
+        for one in sorted(self.candidates, key=lambda one: -one.belief):
+            asked = self.wanted is None or one.marker in self.wanted
+            if asked and one.belief > HOPEFUL and not any(_near(one, other) for other in (*self.believed, *doubtful)):
+                doubtful.append(one)
+        return doubtful
 
     def add(self, seen: Iterator[tuple[_Look, Array]]) -> None:
         """Reads the squares."""
         for look, rough in seen:
             self.candidates += self._read(look, rough)
         self.believed = []
+        enough = belief.ENOUGH if self.wanted is None else belief.ENOUGH_OF_TARGETS
         for one in sorted(self.candidates, key=lambda one: -one.belief):
-            if one.belief < belief.ENOUGH:
+            if one.belief < enough:
                 break
             if not any(_near(one, other) for other in self.believed) and self._alike(one):
                 self.believed.append(one)
@@ -216,8 +227,20 @@ def _halved(grey: Picture) -> Iterator[_Look]:
         )
 
 
+def _part(grey: Picture, corners: Array) -> tuple[Picture, Array]:
+    """The picture around a square, half as much again on each side, and where it begins."""
+    reach = _longest(corners) / 2
+    height, width = grey.shape
+    start = np.clip(np.floor(corners.min(axis=0) - reach), 0, (width - 1, height - 1)).astype(int)
+    end = np.ceil(corners.max(axis=0) + reach).astype(int) + 1
+    return np.ascontiguousarray(grey[start[1] : end[1], start[0] : end[0]]), start.astype(float)
+
+
+def _longest(corners: Array) -> float:
+    return float(np.linalg.norm(np.roll(corners, 1, axis=0) - corners, axis=1).max())
+
+
 def _near(one: _Candidate, other: _Candidate) -> bool:
     """Whether the middle of either square lies within half the other's side of its middle."""
     apart = np.linalg.norm(one.corners.mean(axis=0) - other.corners.mean(axis=0))
-    sides = [np.linalg.norm(np.roll(each.corners, 1, axis=0) - each.corners, axis=1).max() for each in (one, other)]
-    return bool(apart < max(sides) / 2)
+    return bool(apart < max(_longest(one.corners), _longest(other.corners)) / 2)

@@ -21,6 +21,7 @@ SPOTS = SPOT * np.array([-0.5, 0.0, 0.5])  # where a cell is sampled, in cells f
 BESIDE = 0.3  # of a cell: how far outside the square the paper is looked for; some print with hardly a rim
 BESIDE_PX = 1.2  # and at least: there the edge's own blur ends
 AT_ONCE = 400_000  # products: of more, the matrix library makes threads, which wait for one another on a busy machine
+VEIL = 5.0  # grey levels of stray light in the darkest print
 SMOOTHED = 0.45  # of the noise's variance is left between pixels
 NOISY = 0.8  # of a square's variance at most is believed to be noise
 LIGHTER = 0.25  # of the contrast: by this much paper is lighter than the border, or it is no edge
@@ -97,11 +98,17 @@ def fits(inner: Array, rows: Rows) -> NDArray[np.float32]:
     return np.concatenate([looks[start : start + few] @ rows.T for start in range(0, max(1, len(looks)), few)])
 
 
+def _unshaded(grey: Array) -> Array:
+    """Grey levels as logarithms: there a shadow takes the same from light and dark, and can be lived with."""
+    return np.asarray(np.log(np.maximum(grey, 0) + VEIL))
+
+
 def match(inner: Array, seen: tuple[Rows, ...]) -> Match:
     """The rows that the cells (n, cells) correlate with best, at whatever blur."""
     best = fits(inner, seen[0])
     for rows in seen[1:]:
         np.maximum(best, fits(inner, rows), out=best)
+    np.maximum(best, fits(_unshaded(inner), seen[0]), out=best)
     each, count = np.arange(len(best)), best.shape[1] // 4
     row = best.argmax(axis=1)
     others = np.maximum.reduce([best[:, turn * count : (turn + 1) * count] for turn in range(4)])
@@ -143,8 +150,13 @@ def likeness(grey: Picture, square: Array, faces: NDArray[np.float32], noise: fl
     x, y = place(square[None], across.ravel(), down.ravel())
     within = slice(GRAIN, -GRAIN)
     seen = sample(grey, x, y).reshape(size, size)[within, within]
+    wanted = faces[:, within, within]
+    return max(_explained(seen, wanted, noise), _explained(_unshaded(seen), wanted[:1], 0.0))
+
+
+def _explained(seen: Array, faces: NDArray[np.float32], noise: float) -> float:
     seen = seen - seen.mean()
-    wanted = faces[:, within, within] - faces[:, within, within].mean(axis=(1, 2), keepdims=True)
+    wanted = faces - faces.mean(axis=(1, 2), keepdims=True)
     total = float((seen**2).sum())
     total = max(total - SMOOTHED * noise**2 * seen.size, (1 - NOISY) * total, 1e-9)
     together = np.clip((wanted * seen).sum(axis=(1, 2)), 0, None) ** 2

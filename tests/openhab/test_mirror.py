@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import os
 import queue
+import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 from pydantic import SecretStr, ValidationError
 
 from services.bus import Message
+from services.client import connected
+from services.config import BusSettings, load
 from services.errors import BadMessage
 from services.openhab.mirror import Config, Mirror, start
 from services.openhab.rest import change_of
-from services.peers import free_port, wait_until
+from services.peers import free_port, mosquitto, wait_until
+from services.supervisor import Supervisor, commands, in_background, processes
 from services.topics import HOME_COMMAND, HOME_SET
-from tests.openhab.homes import shipped
+from tests.openhab.homes import SHIPPED, shipped
 from tests.openhab.rest_stand_in import OpenHab, serving
 
 LIMIT_S = 60.0
@@ -190,3 +196,29 @@ def test_lines_that_are_no_changes_are_passed_over(line: str) -> None:
 def test_an_address_with_a_password_is_refused() -> None:
     with pytest.raises(ValidationError, match="without a password"):
         Config(url="http://user:secret@192.0.2.1:8080", home=shipped())
+
+
+@pytest.mark.mosquitto
+def test_it_runs_as_a_process_on_a_real_broker(
+    openhab: OpenHab, mosquitto_broker: mosquitto.Broker, tmp_path: Path
+) -> None:
+    config = tmp_path / "config" / "simulated.yaml"
+    shutil.copytree(SHIPPED.parent, config.parent)
+    given = {
+        "APARTMENT_BROKER_PORT": str(mosquitto_broker.port),
+        "APARTMENT_STATE": str(tmp_path),
+        "OPENHAB_TOKEN": TOKEN,
+    }
+    with ExitStack() as stack:
+        port = stack.enter_context(serving(openhab))
+        section = f"\nopenhab: {{url: 'http://127.0.0.1:{port}', token: '${{OPENHAB_TOKEN}}'}}\n"
+        config.write_text(config.read_text(encoding="utf-8") + section, encoding="utf-8")
+        apartment = load(config, ("openhab",), environment={**os.environ, **given})
+        running_ = commands(processes(apartment, ["openhab"]), config)
+        stack.enter_context(in_background(Supervisor(running_, given, tmp_path / "services.log")))
+        bus = stack.enter_context(connected(BusSettings(port=mosquitto_broker.port), ["#"], timeout_s=LIMIT_S))
+        assert bus.payload("home/Temp/state", lambda text: text == "21.5 °C", LIMIT_S) == "21.5 °C"
+        bus.say("home/Lamp/command", "ON")
+        assert bus.payload("home/Lamp/state", lambda text: text == "ON", LIMIT_S) == "ON"
+        assert bus.payload("service/openhab/status", lambda text: text == "online", LIMIT_S) == "online"
+    assert openhab.commands == [("Lamp", "ON")]

@@ -14,8 +14,8 @@ import numpy as np
 from services.camera.calibration.shots import BoardShot, How, board_in, taken
 from services.camera.calibration.study import study
 from services.camera.calibration.wishes import CalibrateLens
-from services.camera.plan import Plan, wait
-from services.camera.requests import Away, Refused
+from services.camera.plan import Plan, attempt, wait
+from services.camera.requests import Away, Refused, Status
 from services.vision.calibrate_lens import Fit, doubt_px, fit
 from services.vision.coverage import Album
 
@@ -59,6 +59,7 @@ class Showing:
                     return found
             if now > until:
                 return (yield from self._at_the_end())
+            yield from attempt(Status())  # nobody else asks while the motors are held: whether it is still there
             now = yield from wait(now + PAUSE_S)
 
     def _look(self, now: float) -> Plan[float]:
