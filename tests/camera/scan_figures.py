@@ -71,6 +71,8 @@ class Sighted:
     def share(self) -> float:
         """Ours of the report's, over the markers that both saw in their first turn."""
         both = self.ours.keys() & self.report.keys()
+        if not both:
+            return float("nan")
         return mean(self.ours[one] for one in both) / mean(self.report[one] for one in both)
 
 
@@ -177,7 +179,7 @@ def _second_turn(message: Message) -> bool:
     if message.topic != "camera/ip1/scan/state":
         return False
     state = read(message, message.received).payload
-    return bool(state.turn == 2 or (state.state in ("done", "failed") and state.elapsed_s > 1.0))
+    return FIRST in state.targets and bool(state.turn == 2 or state.state in ("done", "failed"))
 
 
 def first_sightings(flat: SmallFlat) -> dict[int, float]:
