@@ -15,9 +15,9 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from services import access, client, process, secret_store, stored, topics
+from services import access, client, process, secret_store, topics
 from services.bus import Message
-from services.command_line import calibrate, mission, openhab, zoom
+from services.command_line import calibrate, mission, openhab, stored
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -139,7 +139,7 @@ def scan(
     json: Json = False,
 ) -> None:
     """Look for markers with a camera; exit 1 when one was not found."""
-    from services import scanned  # it brings OpenCV
+    from services.command_line import scanned  # it brings OpenCV
 
     apartment = load(config)
     if camera not in apartment.cameras:
@@ -191,7 +191,6 @@ def probe(
 
 
 stored.add_to(app)
-calibrate.app.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom.zoom)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(mission.app, name="mission")
 app.add_typer(openhab.app, name="openhab")

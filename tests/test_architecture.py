@@ -74,11 +74,9 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.client": (*CORE, *BUSES, *SHELL),
     "services.peers": (*CORE, "services.access"),
     "services.simulated": (*CORE, *SHELL, "services.client", "services.peers", "services.supervisor"),
-    "services.stored": ("services",),
     "services.command_line": ("services",),
     "services.virtual": ("services",),
     "services.demo": ("services",),
-    "services.scanned": ("services",),
     "services.pytest_plugin": ("services",),
     "services.__main__": ("services",),
 }
@@ -114,7 +112,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "croniter": ("services.persistence.cron",),
     "yaml": ("services.document",),
     "lark": ("services.openhab.check.",),
-    "typer": ("services.__main__", "services.stored", "services.command_line."),
+    "typer": ("services.__main__", "services.command_line."),
     "rich": (
         "services.__main__",
         "services.command_line.",
@@ -181,7 +179,7 @@ IMPURE = (
     "threading", "time", "urllib",
 )  # fmt: skip
 
-PRINTS = ("services.__main__", "services.stored")
+PRINTS = ("services.__main__", "services.command_line.stored")
 CATCHES_ALL = ("services.supervisor",)
 VALIDATORS = (
     "field_validator",

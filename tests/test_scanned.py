@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services import scanned
+from services.command_line import scanned
 from services.vision.chart import RED, Mark, Plan, aim, draw, ellipse
 from services.vision.frames import Mount
 from tests.camera.scan.virtual_scan import virtual_scan

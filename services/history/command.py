@@ -1,6 +1,6 @@
 """`apartment history`: a question from the terminal, and its answer as a table, CSV, JSON or a plot.
 
-It opens the database itself, so that it works while nothing runs. Not here: options (`services/stored.py`).
+It opens the database itself, so that it works while nothing runs. The options: `command_line/stored.py`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """OpenHAB's own tables: reads those that an OpenHAB filled, and writes such for one that is to go on with them.
 
 Both layouts: of the old MySQL binding (`Items`, `Item<N>`, local time in whole seconds) and of the JDBC service
-(`item0001`, `<name>_0001`, or the item's bare name without an index). Not here: the commands (`services/stored.py`).
+(`item0001`, `<name>_0001`, or the item's bare name without an index). The commands: `command_line/stored.py`.
 """
 
 from __future__ import annotations

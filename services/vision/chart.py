@@ -1,6 +1,6 @@
 """A plan of the apartment with what a scan has found, as a picture: rooms, camera, places, markers with their doubt.
 
-Numbers in, pixels out. Where the numbers come from is `services/scanned.py`.
+Numbers in, pixels out. Where the numbers come from is `services/command_line/scanned.py`.
 """
 
 from __future__ import annotations
