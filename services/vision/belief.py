@@ -15,7 +15,7 @@ from services.vision.reading import Evidence, Match
 
 Array = NDArray[np.float64]
 
-ENOUGH = 16.0  # belief (natural logarithm of odds) of any marker: the best of what was none had 16 in 750 pictures
+ENOUGH = 16.0  # belief (natural logarithm of odds) of any marker
 ENOUGH_OF_TARGETS = 14.0  # of one that was asked for: what looks like any marker is rarely that one
 FIRST_CORRELATION = 0.4  # of a rough square worth refining: its corners are half a pixel off
 FIRST_CONTRAST = 5.0  # grey levels
@@ -32,6 +32,7 @@ SIMPLER = 3.0  # edges fewer than the dictionary's average that need no more pro
 PER_EDGE = 3.0  # belief that each further one takes
 SMALL_CELL_PX = 2.2  # side of a cell below which proof is taken off
 PER_PX = 20.0
+NARROW = 1.15  # the narrow side of a square counts so much, where that is less than the root of its area
 SIMPLE = 12.0  # a code with so much taken off is one that pictures imitate:
 SIMPLE_CELL_PX = 3.0  # it must be this large
 
@@ -57,7 +58,9 @@ def beliefs(book: Book, match: Match, proof: Evidence, squares: Array, noise: fl
 
 
 def _side(squares: Array) -> Array:
-    """The root of each one's area."""
+    """The root of each one's area; less where it is seen so much from aside that its cells run together one way."""
     x, y = squares[..., 0], squares[..., 1]
-    twice = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
-    return np.asarray(np.sqrt(np.abs(twice) / 2))
+    area = np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)) / 2
+    sides = np.linalg.norm(np.roll(squares, -1, axis=1) - squares, axis=2)
+    longest = np.maximum(sides[:, 0] + sides[:, 2], sides[:, 1] + sides[:, 3]) / 2
+    return np.asarray(np.minimum(np.sqrt(area), NARROW * area / np.maximum(longest, 1e-6)))

@@ -34,9 +34,10 @@ def test_nothing_is_invented_amid_what_looks_like_markers() -> None:
 
 
 def test_hard_photographs_are_read_where_opencv_gives_up() -> None:
-    ours, theirs, false = trials.recall(range(1000, 1024), hard=True)
+    ours, theirs, false = trials.recall(range(500, 540), hard=True)
     assert false == 0
-    assert ours >= theirs + 0.12
+    assert ours >= 0.7
+    assert ours >= theirs + 0.15
 
 
 def test_photographs_that_are_not_hard_are_all_read() -> None:
