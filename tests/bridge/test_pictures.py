@@ -127,8 +127,10 @@ def test_nothing_is_decoded_or_even_fetched_for_nobody(studio: Studio) -> None:
 def test_every_picture_arrives_soon_with_its_lens_and_stamp(studio: Studio) -> None:
     stream = studio.stream
     with listening(studio.master, IMAGE, JPEG, INFO) as ear:
-        ear.wait_for(IMAGE, 40)
-        images, jpegs, infos = ear.of(IMAGE)[10:40], ear.of(JPEG), ear.of(INFO)
+        images = ear.wait_for(IMAGE, 40)[10:40]
+        stamps = {one["stamp"] for one in images}
+        wait_until(lambda: stamps <= {one["stamp"] for one in ear.of(INFO)}, "the lens of each picture", PATIENCE_S)
+        jpegs, infos = ear.of(JPEG), ear.of(INFO)
     added = [one["at"] - stream.put[one["number"]] for one in images]
     assert min(added) <= ADDED_S, sorted(added)  # a busy machine delays the others; the bench tells p50 and p99
     numbers = [one["number"] for one in images]
@@ -137,8 +139,6 @@ def test_every_picture_arrives_soon_with_its_lens_and_stamp(studio: Studio) -> N
     assert {(one["frame"], *one["size"], one["encoding"]) for one in images} == {
         ("ip1_optical_frame", *patterns.SIZE, "bgr8")
     }
-    without = {one["stamp"] for one in images} - {one["stamp"] for one in infos}
-    assert len(without) <= len(images) / 10, "each with its lens, but for what a busy machine drops"
     assert {one["frame"] for one in infos} == {"ip1_optical_frame"}
     assert infos[0]["K"][0] == pytest.approx(579.2)
     untouched = {hashlib.sha256(jpeg).hexdigest() for jpeg in list(stream.jpegs.values())}

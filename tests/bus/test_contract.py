@@ -17,7 +17,7 @@ from services.bus.memory import Hub, MemoryBus
 from services.bus.mqtt import Address, MqttBus
 from services.peers import embedded, free_port, mosquitto
 
-WITHIN_S = 20.0  # the embedded broker is slow to answer on a busy machine; promises have limits of their own
+WITHIN_S = 5.0
 BIRTH = Message("service/operator/status", b"online", retain=True)
 WILL = Message("service/operator/status", b"offline", retain=True)
 
@@ -129,10 +129,17 @@ def take(bus: Any, count: int, *others: Any) -> list[Message]:
 
 
 def listen(bus: Any, *filters: str) -> None:
-    """Subscribes and waits until the broker has granted it: a word to oneself comes back."""
+    """Subscribes and waits until the broker has granted it: a word to oneself comes back.
+
+    It is said again until then: amqtt may hand on a word before it has entered the subscription that came first.
+    """
     bus.subscribe([*filters, "reply/granted"])
-    bus.publish(Message("reply/granted", bus_id(bus)))
-    until(lambda: any(m.payload == bus_id(bus) for m in bus.receive(0.02)))
+
+    def granted() -> bool:
+        bus.publish(Message("reply/granted", bus_id(bus)))
+        return any(m.payload == bus_id(bus) for m in bus.receive(0.2))
+
+    until(granted)
 
 
 def bus_id(bus: Any) -> bytes:
