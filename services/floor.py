@@ -13,7 +13,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError
@@ -134,6 +133,8 @@ class MapFile(Section):
 
 def read(file: Path) -> Grid:
     """A map_server YAML and the picture that it names; ConfigError tells file and line."""
+    import cv2  # 40 MB: only where a map is read, not wherever a configuration is
+
     source = document.read(file)
     document.must(source)
     try:

@@ -17,7 +17,6 @@ from services.bus import Message
 from services.client import Client
 from services.config import Apartment, load
 from services.errors import ConfigError
-from services.mission import Config as Missions
 from services.robot_payloads import MissionOrder, MissionResult, MissionState, Where, WhereReply
 from services.topics import MISSION_ORDER, MISSION_RESULT, MISSION_STATE, MISSION_WHERE, MISSION_WHERE_REPLY, read
 
@@ -76,6 +75,8 @@ def _robot(config: Path, wanted: str | None) -> Iterator[tuple[Client, str]]:
 
 def _robot_of(apartment: Apartment, wanted: str | None) -> str:
     """The robot that is meant: the one that was named, or the only one; ConfigError otherwise."""
+    from services.mission import Config as Missions  # for these commands alone
+
     mission = apartment.instances.get("mission")
     robots = list(mission.config.robots) if mission is not None and isinstance(mission.config, Missions) else []
     if wanted is None and len(robots) == 1:

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from services import document, secret_store
 from services.config import Apartment, load
 from services.errors import ConfigError
-from services.openhab import folder as folders
-from services.openhab.check import KINDS, check
-from services.openhab.generate import files
-from services.openhab.importing import best_version, home_of
-from services.openhab.site import Broker, BusDesign, Camera, Site
-from services.openhab.versions import parse
+
+if TYPE_CHECKING:  # the grammars and HTTP, for these commands alone: every process of a service loads this module
+    from services.openhab.folder import Plan
+    from services.openhab.site import Broker, BusDesign, Camera
 
 CONFIG = Path("config/apartment.yaml")
 DESIGNS = ("dsl", "js", "links")
@@ -36,13 +34,18 @@ def generate_(
     config: Config = CONFIG,
 ) -> None:
     """Write OpenHAB's files from the model of the home. Files of others are never touched."""
+    from services.openhab import folder as folders
+    from services.openhab.generate import files
+    from services.openhab.site import Site
+    from services.openhab.versions import parse
+
     if bus not in DESIGNS:
         raise ConfigError([f"--bus: expected one of {', '.join(DESIGNS)}, got {bus!r}"])
     version = parse(openhab)
     apartment = load(config, ())
     known = folders.taken(out, version) if out.is_dir() else {}
     site = Site(
-        apartment.home, version, _cameras(apartment), _broker(apartment, broker), cast(BusDesign, bus),
+        apartment.home, version, _cameras(apartment), _broker(apartment, broker), cast("BusDesign", bus),
         None if persistence == "none" else persistence, frozenset(known),
     )  # fmt: skip
     plan = folders.plan(out, files(site))
@@ -59,7 +62,7 @@ def generate_(
         raise typer.Exit(1)
 
 
-def _tell(plan: folders.Plan) -> None:
+def _tell(plan: Plan) -> None:
     for path in plan.written:
         typer.echo(f"wrote {plan.folder / path}")
     for path in plan.gone:
@@ -68,6 +71,8 @@ def _tell(plan: folders.Plan) -> None:
 
 
 def _broker(apartment: Apartment, text: str | None) -> Broker:
+    from services.openhab.site import Broker
+
     host, _, port = (text or "").rpartition(":") if text and ":" in text else (text or "", "", "")
     if port and not port.isdigit():
         raise ConfigError([f"--broker: expected host:port, got {text!r}"])
@@ -81,7 +86,8 @@ def _cameras(apartment: Apartment) -> tuple[Camera, ...]:
 
 def _camera(apartment: Apartment, name: str) -> Camera:
     """A camera as its section says; its addresses are those of our proxy, where it has a fixed one."""
-    from services.camera.places import Places  # the camera's libraries, for this command alone
+    from services.camera.places import Places
+    from services.openhab.site import Camera
 
     settings: Any = apartment.instances[f"camera-{name}"].config
     stream = settings.stream
@@ -99,7 +105,7 @@ def _camera(apartment: Apartment, name: str) -> Camera:
 
 @app.command(name="check", epilog="Example: apartment openhab check --openhab 4 items/ sitemaps/home.sitemap")
 def check_(
-    files: Annotated[list[Path], typer.Argument(help=f"Files ({', '.join(KINDS)}), or folders of them.")],
+    files: Annotated[list[Path], typer.Argument(help="Files, or folders of them.")],
     openhab: OpenHab = "5",
     json: Annotated[bool, typer.Option("--json", help="Data instead of text.")] = False,
     live: Annotated[
@@ -107,6 +113,10 @@ def check_(
     ] = None,
 ) -> None:
     """Check files of OpenHAB as strictly as it does itself; exit 1 when one has an error."""
+    from services.openhab import folder as folders
+    from services.openhab.check import KINDS, check
+    from services.openhab.versions import parse
+
     texts = folders.texts(files)
     unknown = [name for name in texts if Path(name).suffix not in KINDS]
     if unknown:
@@ -142,6 +152,10 @@ def import_(
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
 ) -> None:
     """Make a home.yaml of a site's items, things and persistence; exit 1 when a file could not be read whole."""
+    from services.openhab import folder as folders
+    from services.openhab.importing import best_version, home_of
+    from services.openhab.versions import parse
+
     texts = folders.texts([folder])
     if not any(name.endswith(".items") for name in texts):
         raise ConfigError([f"{folder}:1: file: expected a folder with .items files, got none"])
