@@ -12,8 +12,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 
 from services import topics
-from services.bridge import darkroom
-from services.bridge.darkroom import Done, Told, Wanted
+from services.bridge.hatch import Done, Told, Wanted
 from services.bridge.node import Node
 from services.bridge.part import Part, status
 from services.bridge.rules import Fields, Heard
@@ -96,7 +95,7 @@ class Pictures(Part):
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         self._process = context.Process(
-            target=darkroom.run, args=(self._wanted, theirs, EVERY_S), name="pictures", daemon=True
+            target=_develop, args=(self._wanted, theirs, EVERY_S), name="pictures", daemon=True
         )
         self._process.start()
         theirs.close()
@@ -124,3 +123,10 @@ class Pictures(Part):
         if self._connection is not None:
             self._connection.close()
         self._process = self._connection = self._done = None
+
+
+def _develop(wanted: Wanted, connection: Connection, every_s: float) -> None:
+    """In the process: OpenCV is loaded there, not in the bridge."""
+    from services.bridge import darkroom
+
+    darkroom.run(wanted, connection, every_s)
