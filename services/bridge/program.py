@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import Field, ValidationError, field_validator
 
-from services import __version__
+from services import __version__, robot_places
 from services.bridge import arguments, mapfile, messages, rulebook
 from services.bridge.confirm import Confirm
 from services.bridge.darkroom import Wanted
@@ -28,6 +28,7 @@ from services.bridge.snapshots import Snapshots
 from services.bridge.tree import Tree
 from services.errors import ConfigError
 from services.home import Home
+from services.robot_places import Relation
 from services.runner import Post
 from services.section import Section
 from services.vision.frames import Mount
@@ -48,9 +49,10 @@ class Config(Section):
     rules: str = "bridge.yaml"  # which topics are bridged, and how
     node: str = Field(default="iot_bridge", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # its name in the ROS graph
     master_uri: str | None = None  # http://host:11311; without it ROS_MASTER_URI of the environment
-    apartment: tuple[float, float, float] = (0.0, 0.0, 0.0)  # its origin on the robot's map: x, y in m, yaw in degrees
     robot: str | None = None  # its name on the bus, for /iot_mission; None: no missions here
-    map: Path | None = None  # a map_server YAML, shown on /map; relative to the configuration
+    places: Path | None = None  # the robot's file: its map, shown on /map, and where the apartment lies in it
+    map: Path | None = None  # a map_server YAML to be shown instead; relative to the configuration
+    apartment: None = None  # until 0.1 the relation stood here, and a second time in the robot's file
     simulated: bool = False  # a ROS node in memory, where there is no ROS
     name: str = "bridge"
     home: Home
@@ -58,6 +60,13 @@ class Config(Section):
     camera_sections: dict[str, Hung] = {}
     folder: Path
     state: Path | None = None
+
+    @field_validator("apartment", mode="before")
+    @classmethod
+    def stands_in_the_robots_file(cls, value: Any) -> None:
+        """Two files that say where the apartment lies would come to differ."""
+        if value is not None:
+            raise ValueError(f"expected places: FILE, whose apartment_to_map says it for all, got {value!r}")
 
     @field_validator("camera_sections", mode="before")
     @classmethod
@@ -76,7 +85,8 @@ def check(config: Config) -> None:
     faults: list[str] = []
     for load in (
         lambda: rulebook.load(config.folder / config.rules, config.cameras, known),
-        lambda: mapfile.load(config.folder / config.map) if config.map else None,
+        lambda: _relation(config),
+        lambda: mapfile.load(shown) if (shown := _map(config)) else None,
     ):
         try:
             load()
@@ -108,11 +118,11 @@ def _parts(config: Config) -> tuple[Part, ...]:
     if config.cameras:
         mounts = {cam: one.mount for cam, one in config.camera_sections.items() if one.mount is not None}
         snapshots = config.state / "snapshots" if config.state else None
-        parts += [Tree(config.cameras, mounts, config.apartment), Snapshots(config.cameras, snapshots)]
+        parts += [Tree(config.cameras, mounts, _relation(config)), Snapshots(config.cameras, snapshots)]
         parts.append(Lenses(config.cameras))
     if config.robot is not None:
         parts.append(Missions(config.robot))
-    if not config.simulated and (config.cameras or config.map):
+    if not config.simulated and (config.cameras or _map(config)):
         parts.append(Pictures(_wanted(config)))
     return tuple(parts)
 
@@ -124,8 +134,23 @@ def _wanted(config: Config) -> Wanted:
         cam: ("" if cam == config.cameras[0] else f"/{cam}", config.folder / files[cam] if cam in files else None)
         for cam in config.cameras
     }
-    map_file = config.folder / config.map if config.map else None
-    return Wanted(f"{arguments.name(config.node)}_pictures", config.master_uri, cameras, map_file)
+    return Wanted(f"{arguments.name(config.node)}_pictures", config.master_uri, cameras, _map(config))
+
+
+def _relation(config: Config) -> Relation:
+    """Where the apartment lies in the robot's map; its own origin where nobody says."""
+    if config.places is None:
+        return Relation()
+    return robot_places.places(config.folder / config.places).apartment_to_map
+
+
+def _map(config: Config) -> Path | None:
+    """The map that is shown: the bridge's own, else the robot's."""
+    if config.map is not None or config.places is None:
+        return config.folder / config.map if config.map else None
+    file = config.folder / config.places
+    named = robot_places.places(file).map
+    return file.parent / named if named else None
 
 
 def _all_ports(config: Config, rules: tuple[Rule, ...], parts: tuple[Part, ...]) -> Ports:
