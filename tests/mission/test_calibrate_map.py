@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Event, Thread
 
 import pytest
 import yaml
@@ -12,13 +15,16 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner, Result
 
 from services import robot_places
+from services.client import Client, connected
 from services.command_line import calibrate
+from services.config import BusSettings
 from services.errors import ConfigError
 from services.mission.both import Both
-from services.payloads import Point, stamp
+from services.payloads import Point, ScanResult, stamp
+from services.peers.mosquitto import Broker
 from services.robot_payloads import RobotPose, RobotSeen, SeenMarker
 from services.robot_places import Relation, with_relation
-from services.topics import read
+from services.topics import CAMERA_MARKER, ROBOT_POSE, ROBOT_SEEN, read
 from services.vision.calibrate_map import Pair, fit
 from tests.trials import virtual_flat
 
@@ -159,6 +165,59 @@ def test_what_robot_and_house_both_see_gives_the_relation(tmp_path: Path) -> Non
     for corner in CORNERS:
         there = Relation(x=found.x, y=found.y, yaw_deg=found.yaw_deg).to_map(*corner)
         assert there == pytest.approx(TRUTH.to_map(*corner), abs=0.05)
+
+
+@pytest.mark.mosquitto
+def test_what_is_measured_on_the_bus_is_kept_and_used(
+    config: Path, tmp_path: Path, mosquitto_broker: Broker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("APARTMENT_BROKER_PORT", str(mosquitto_broker.port))
+    monkeypatch.setenv("BUS_OPERATOR_PASSWORD", mosquitto_broker.passwords["operator"])
+    points = str(tmp_path / "points.yaml")
+    with connected(BusSettings(port=mosquitto_broker.port)) as bus, robot_that_sees(bus):
+        shown = calibrated(config, "--here", "0,0", "--pairs", points, "--yes")
+        assert "got 1: one point tells no direction" in str(shown.exception)
+        shown = calibrated(config, "--seen", "4", "--pairs", points, "--yes")
+    assert shown.exit_code == 0, shown.output
+    found = relation(config)
+    assert (found.x, found.y, found.yaw_deg) == pytest.approx((1.5, -0.8, 12.0), abs=1e-3)
+    assert [one["name"] for one in yaml.safe_load(Path(points).read_text())["pairs"]] == [
+        "robot at 0,0", "marker 17", "marker 582"
+    ]  # fmt: skip
+
+
+@contextmanager
+def robot_that_sees(bus: Client) -> Iterator[None]:
+    """Stands on the apartment's origin, and says again and again that it sees two markers that a camera has found."""
+    at = {582: (3.9, 4.5), 17: (1.8, 4.1)}
+    x, y = TRUTH.to_map(0, 0)
+    pose = ROBOT_POSE.message(RobotPose(x=x, y=y, yaw_deg=90, stamp=stamp(0)), robot="tiago")
+    there = {marker: TRUTH.to_map(*here) for marker, here in at.items()}
+    markers = [SeenMarker(marker=marker, position=Point(x=u, y=v, z=0.5)) for marker, (u, v) in there.items()]
+    seen = ROBOT_SEEN.message(RobotSeen(markers=markers, stamp=stamp(0)), robot="tiago")
+    found = [CAMERA_MARKER.message(result(marker, *here), cam="ip1", marker=str(marker)) for marker, here in at.items()]
+    stopping = Event()
+
+    def speak() -> None:
+        while not stopping.wait(0.05):
+            for message in (pose, seen, *found):
+                bus.publish(message)
+
+    thread = Thread(target=speak)
+    thread.start()
+    try:
+        yield
+    finally:
+        stopping.set()
+        thread.join()
+
+
+def result(marker: int, x: float, y: float) -> ScanResult:
+    return ScanResult(
+        camera="ip1", marker=marker, dictionary="DICT_5X5_1000", place="Sofa", position=Point(x=x, y=y, z=0.5),
+        covariance=[[1e-6, 0, 0], [0, 1e-6, 0], [0, 0, 1e-6]], orientation=None, orientations=[], distance=3.0, zoom=0,
+        frames=1, mode="bw", first_seen=stamp(0), stamp=stamp(0), scan="s",
+    )  # fmt: skip
 
 
 def test_what_a_robot_sees_while_it_moves_does_not_count() -> None:
