@@ -54,6 +54,7 @@ class RobotPlaces(Section):
     map: Path | None = None  # map_server's YAML, beside this file
     apartment_to_map: Relation = Relation()
     radius: float = Field(default=0.28, gt=0, lt=2)  # of the robot, metres
+    eye: float = Field(default=1.1, gt=0, lt=3)  # height of its camera over the floor, metres
     points: dict[str, PointPose] = {}
 
     def named(self, name: str) -> str | None:
