@@ -62,7 +62,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
     "services.runner": (*CORE, "services.aside"),
     "services.camera": (*SERVICE, "services.vision"),
-    "services.bridge": (*SERVICE, "services.vision", "services.floor"),
+    "services.bridge": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage"),
     "services.openhab": SERVICE,
