@@ -61,7 +61,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
     "services.runner": (*CORE, "services.aside"),
     "services.camera": (*SERVICE, "services.vision"),
-    "services.bridge": (*SERVICE, "services.vision", "services.floor"),
+    "services.bridge": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage"),
     "services.openhab": SERVICE,
@@ -83,7 +83,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
 
 # One library, one door: where a library may be imported. A name alone is a module, one with a dot at its end all in it.
 EVERYWHERE = ("services", "services.")
-ROS = ("services.bridge.", "services.simulators.robot")
+ROS = ("services.bridge.", "services.simulators.robot.")
 DOORS: dict[str, tuple[str, ...]] = {
     "pydantic": EVERYWHERE,
     "pydantic_core": EVERYWHERE,
@@ -123,7 +123,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "starlette": ("services.dashboard.http",),
     "uvicorn": ("services.dashboard.http",),
     "pytest": ("services.pytest_plugin",),
-    **dict.fromkeys(("rospy", "rosgraph", "rosmaster", "genpy", "roslib", "actionlib", "tf2_ros"), ROS),
+    **dict.fromkeys(("rospy", "rosgraph", "rosmaster", "genpy", "genmsg", "roslib", "actionlib", "tf2_ros"), ROS),
     **dict.fromkeys(("std_msgs", "diagnostic_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs", "tf2_msgs"), ROS),
     **dict.fromkeys(("std_srvs", "actionlib_msgs", "move_base_msgs"), ROS),
 }
@@ -163,7 +163,8 @@ PURE = (
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
     "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules", "services.bridge.frames", "services.bridge.multipart",
-    "services.bridge.confirm", "services.bridge.pace", "services.bridge.items", "services.bridge.template",
+    "services.bridge.confirm", "services.bridge.pace", "services.bridge.robots.actions",
+    "services.bridge.robots.chain", "services.bridge.robots.goals", "services.bridge.items", "services.bridge.template",
     "services.persistence.rows", "services.persistence.seen", "services.persistence.strategies",
     "services.persistence.cron", "services.persistence.filters", "services.persistence.decisions",
     "services.history.answers", "services.history.plot", "services.storage.reading", *OPENHAB_PURE,

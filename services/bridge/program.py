@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field, ValidationError, field_validator
 
 from services import __version__
-from services.bridge import arguments, mapfile, messages, rulebook
+from services.bridge import arguments, mapfile, messages, robots, rulebook
 from services.bridge.confirm import Confirm
 from services.bridge.darkroom import Wanted
 from services.bridge.items import Items
@@ -20,6 +21,7 @@ from services.bridge.missions import Missions
 from services.bridge.node import Outlet, Ports, ports
 from services.bridge.part import Part
 from services.bridge.pictures import Pictures
+from services.bridge.robots import Robot, Where
 from services.bridge.ros import RosNode
 from services.bridge.rules import Rule
 from services.bridge.service import Bridge
@@ -30,6 +32,7 @@ from services.errors import ConfigError
 from services.home import Home
 from services.runner import Post
 from services.section import Section
+from services.topic import LEVELS
 from services.vision.frames import Mount
 
 
@@ -50,6 +53,7 @@ class Config(Section):
     master_uri: str | None = None  # http://host:11311; without it ROS_MASTER_URI of the environment
     apartment: tuple[float, float, float] = (0.0, 0.0, 0.0)  # its origin on the robot's map: x, y in m, yaw in degrees
     robot: str | None = None  # its name on the bus, for /iot_mission; None: no missions here
+    robots: dict[Annotated[str, Field(pattern=LEVELS["robot"])], Robot] = {}  # that we speak for, by name on the bus
     map: Path | None = None  # a map_server YAML, shown on /map; relative to the configuration
     simulated: bool = False  # a ROS node in memory, where there is no ROS
     name: str = "bridge"
@@ -74,10 +78,12 @@ def check(config: Config) -> None:
     """ConfigError with every fault of the rules; their types are checked where ROS is installed."""
     known = _types(config) if importlib.util.find_spec("genpy") else rulebook.unchecked
     faults: list[str] = []
-    for load in (
+    loads: list[Callable[[], object]] = [
         lambda: rulebook.load(config.folder / config.rules, config.cameras, known),
         lambda: mapfile.load(config.folder / config.map) if config.map else None,
-    ):
+        *(partial(robots.check, one, config.folder) for one in config.robots.values()),
+    ]
+    for load in loads:
         try:
             load()
         except ConfigError as error:
@@ -112,6 +118,9 @@ def _parts(config: Config) -> tuple[Part, ...]:
         parts.append(Lenses(config.cameras))
     if config.robot is not None:
         parts.append(Missions(config.robot))
+    if not config.simulated:  # without ROS the robot is on the bus itself
+        where = Where(arguments.name(config.node), config.master_uri, config.folder, config.state)
+        parts += [robots.part(name, one, where) for name, one in config.robots.items()]
     if not config.simulated and (config.cameras or config.map):
         parts.append(Pictures(_wanted(config)))
     return tuple(parts)

@@ -17,9 +17,9 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from services.bridge import arguments, messages, reach
+from services.bridge import arguments, definitions, messages, reach
 from services.bridge.master import Master, Registrations, register, rival
-from services.bridge.node import CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Server
+from services.bridge.node import ANY, CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Server
 from services.bridge.outgoing import Outgoing
 from services.bridge.rules import Fields
 from services.bridge.simtime import SimulatedTime
@@ -29,6 +29,7 @@ from services.runner import Post
 
 POLL_S = 0.5  # of the master's pid; a new master knows us again within this time and some milliseconds
 LEAVE_S = 2.0  # saying goodbye to a master that hangs must not hold up our end
+LARGE = 2**24  # bytes; rospy drops older pictures only when they fit into its buffer together
 PACKAGES = (
     "python3-rospy python3-diagnostic-msgs python3-geometry-msgs python3-sensor-msgs python3-std-srvs "
     "python3-tf2-msgs python3-nav-msgs"
@@ -54,7 +55,7 @@ class RosNode:
         self._master = Master(rosgraph.get_master_uri() or "http://localhost:11311", caller)
         self._ports = ports
         self._outlets = {outlet.topic: outlet for outlet in ports.outlets}
-        self._classes = {outlet.topic: messages.message_class(outlet.type) for outlet in ports.outlets}
+        self._classes = {outlet.topic: _class(outlet) for outlet in ports.outlets}
         ends = (
             OSError,
             ValueError,
@@ -169,8 +170,9 @@ class RosNode:
         publisher.impl.add_subscriber_listener(outgoing)
 
     def _open_inlet(self, inlet: Inlet) -> None:
-        kind = messages.message_class(inlet.type)
-        self._rospy.Subscriber(inlet.topic, kind, self._heard, callback_args=inlet.topic, tcp_nodelay=True)
+        kind = self._rospy.AnyMsg if inlet.type == ANY else messages.message_class(inlet.type)
+        large = {"queue_size": 1, "buff_size": LARGE} if inlet.newest else {}
+        self._rospy.Subscriber(inlet.topic, kind, self._heard, callback_args=inlet.topic, tcp_nodelay=True, **large)
 
     def _open_server(self, server: Server) -> None:
         kind: Any = messages.service_class(server.type)
@@ -178,6 +180,10 @@ class RosNode:
 
     def _heard(self, message: Any, topic: str) -> None:
         """On rospy's threads, one per publisher."""
+        if isinstance(message, self._rospy.AnyMsg):
+            message = definitions.decoded(message._buff, message._connection_header)
+        if message is None:
+            return
         self._post(Message(FROM_ROS + topic, value=messages.fields_of(message)))
 
     def _called(self, server: Server, response: Any, request: Any) -> Any:
@@ -205,6 +211,12 @@ class RosNode:
             self._uri(), topics.get_publications(), topics.get_subscriptions(), services.get_services(),
             self._ports.parameters,
         )  # fmt: skip
+
+
+def _class(outlet: Outlet) -> Any:
+    if outlet.definition and messages.message_class(outlet.type) is None:
+        return definitions.declare(outlet.type, outlet.definition)
+    return messages.message_class(outlet.type)
 
 
 def _rospy() -> Any:
