@@ -33,6 +33,7 @@ CORE = (
 FILES_OF_OURS = ("services.document", "services.secret_store")  # reading YAML, finding secrets
 SHELL = ("services.config", "services.registry", "services.runner", "services.aside", "services.process")
 BUSES = ("services.bus.mqtt", "services.bus.memory", "services.bus.connection", "services.bus.outbox")
+ROS_GRAPH = ("services.ros_master", "services.ros_node")
 SERVICE = (*CORE, "services.runner", "services.document")  # they meet on the bus, never in an import
 LAYERS: dict[str, tuple[str, ...]] = {
     "services": (),
@@ -51,6 +52,8 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.bus.memory": (*CORE, "services.bus.outbox"),
     "services.bus.connection": CORE,
     "services.bus.outbox": CORE,
+    "services.ros_master": ("services.errors",),
+    "services.ros_node": ("services.errors", "services.ros_master"),
     "services.vision": ("services.errors",),
     "services.storage": ("services.errors",),
     "services.document": ("services.errors",),
@@ -61,14 +64,14 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
     "services.runner": (*CORE, "services.aside"),
     "services.camera": (*SERVICE, "services.vision"),
-    "services.bridge": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
+    "services.bridge": (*SERVICE, *ROS_GRAPH, "services.vision", "services.floor", "services.robot_places"),
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage"),
     "services.openhab": SERVICE,
     "services.hubs": SERVICE,
     "services.mission": (*SERVICE, "services.floor", "services.robot_places"),
     "services.dashboard": SERVICE,
-    "services.simulators": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
+    "services.simulators": (*SERVICE, *ROS_GRAPH, "services.vision", "services.floor", "services.robot_places"),
     "services.process": (*CORE, *BUSES, *SHELL),
     "services.supervisor": ("services.process", "services.config"),
     "services.client": (*CORE, *BUSES, *SHELL),
@@ -83,7 +86,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
 
 # One library, one door: where a library may be imported. A name alone is a module, one with a dot at its end all in it.
 EVERYWHERE = ("services", "services.")
-ROS = ("services.bridge.", "services.simulators.robot.")
+ROS = ("services.ros_node", "services.bridge.", "services.simulators.robot.")
 DOORS: dict[str, tuple[str, ...]] = {
     "pydantic": EVERYWHERE,
     "pydantic_core": EVERYWHERE,
@@ -104,6 +107,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.bridge.images",
         "services.floor",
         "services.simulators.camera.",
+        "services.simulators.robot.eye",
     ),
     "av": ("services.camera.video.rtsp",),
     "gi": ("services.simulators.camera.rtsp.",),
@@ -173,6 +177,7 @@ PURE = (
     "services.mission.moment", "services.mission.standing", "services.mission.memory", "services.mission.telling",
     "services.simulators.agenda", "services.simulators.climate", "services.simulators.robot.route",
     "services.simulators.robot.plan", "services.simulators.robot.sight", "services.simulators.robot.body",
+    "services.simulators.robot.navigation",
     "services.simulators.devices", "services.simulators.life",
 )  # fmt: skip
 IMPURE = (

@@ -1,7 +1,8 @@
 """The node over rospy: topics made on a thread of their own, and registered again at every new ROS master.
 
-rospy's traps are met here, each where it bites: registration (`master.py`), Python's logging, the lock of a
-publisher's buffer, the queue of a new subscriber. Not here: what a message means (`rules.py`, `messages.py`).
+rospy's traps are met here, each where it bites: registration (`services/ros_master.py`), Python's logging
+(`services/ros_node.py`), the lock of a publisher's buffer, the queue of a new subscriber. Not here: what a message
+means (`rules.py`, `messages.py`).
 """
 
 from __future__ import annotations
@@ -12,19 +13,18 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
+from services import ros_node
 from services.bridge import arguments, definitions, messages, reach
-from services.bridge.master import Master, Registrations, register, rival
 from services.bridge.node import ANY, CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Server
 from services.bridge.outgoing import Outgoing
 from services.bridge.rules import Fields
 from services.bridge.simtime import SimulatedTime
 from services.bus import Message
 from services.errors import ConfigError, Unavailable
+from services.ros_master import Master, register, rival
 from services.runner import Post
 
 POLL_S = 0.5  # of the master's pid; a new master knows us again within this time and some milliseconds
@@ -123,9 +123,9 @@ class RosNode:
             self._end(f"it was shut down from outside; most often another node is named {self._master.caller}")
             return
         if pid == self._registered_with:
-            self._registrations_module().get_topic_manager().check_all()  # who has gone is noticed in writing only
+            ros_node.topic_manager().check_all()  # who has gone is noticed in writing only
             return
-        own = self._uri() if self._opened else ""
+        own = ros_node.uri() if self._opened else ""
         if other := rival(self._master, own):
             self._end(
                 f"another node is named {self._master.caller}, at {other}: name one of them otherwise (bridge.node)"
@@ -134,9 +134,9 @@ class RosNode:
         if not self._opened:
             self._open()
         self._clock.follow(self._master)
-        register(self._master, self._registrations())
+        register(self._master, ros_node.registrations(self._ports.parameters))
         self._registered_with = pid
-        count, advice = self._link.registrations + 1, reach.advice(self._uri(), self._master.uri)
+        count, advice = self._link.registrations + 1, reach.advice(ros_node.uri(), self._master.uri)
         self._tell(Link(up=True, text=f"{self._master.uri} pid {pid}", registrations=count, advice=advice))
 
     def _end(self, text: str) -> None:
@@ -150,10 +150,9 @@ class RosNode:
 
     def _open(self) -> None:
         """Makes the node and all its topics. Only `init_node` talks to the master, which has just answered."""
-        with _logging_kept():
-            self._rospy.init_node(self._name, disable_signals=True, disable_rosout=True, disable_rostime=True)
+        ros_node.begin(self._name)
         self._opened = True
-        self._registrations_module().get_registration_listeners().clear()
+        ros_node.forget_listeners()
         for outlet in self._ports.outlets:
             self._open_outlet(outlet)
         for inlet in self._ports.inlets:
@@ -198,20 +197,6 @@ class RosNode:
                 continue
         raise self._rospy.ServiceException("the bridge ends" if self._stopping.is_set() else "no answer in time")
 
-    def _uri(self) -> str:
-        return str(importlib.import_module("rospy.core").get_node_uri())
-
-    def _registrations_module(self) -> Any:
-        return importlib.import_module("rospy.impl.registration")
-
-    def _registrations(self) -> Registrations:
-        registration = self._registrations_module()
-        topics, services = registration.get_topic_manager(), registration.get_service_manager()
-        return Registrations(
-            self._uri(), topics.get_publications(), topics.get_subscriptions(), services.get_services(),
-            self._ports.parameters,
-        )  # fmt: skip
-
 
 def _class(outlet: Outlet) -> Any:
     if outlet.definition and messages.message_class(outlet.type) is None:
@@ -220,30 +205,9 @@ def _class(outlet: Outlet) -> Any:
 
 
 def _rospy() -> Any:
-    """Its import puts its own logger class in Python's place, which loses the line of whoever logs.
-
-    Of what it tells itself, every connection for one, our log gets the warnings.
-    """
-    before = logging.getLoggerClass()
-    for name in ("rospy", "rosgraph"):
-        logging.getLogger(name).setLevel(logging.WARNING)
     try:
-        return importlib.import_module("rospy")
+        return ros_node.rospy()
     except ImportError as error:
         raise ConfigError(
             [f"bridge: expected ROS 1 ({error}): apt-get install {PACKAGES}, or simulated: true"]
         ) from error
-    finally:
-        logging.setLoggerClass(before)
-
-
-@contextmanager
-def _logging_kept() -> Iterator[None]:
-    """`init_node` takes our handlers from the root logger, and sets its level."""
-    root = logging.getLogger()
-    handlers, level = list(root.handlers), root.level
-    try:
-        yield
-    finally:
-        root.handlers[:] = handlers
-        root.setLevel(level)

@@ -15,7 +15,7 @@ import time
 from math import inf
 from multiprocessing.connection import Connection
 
-from services.bridge import images
+from services.bridge import definitions, images
 from services.bridge.darkroom import LOG_FORMAT
 from services.bridge.node import ANY, FROM_ROS, Inlet, Outlet, Ports
 from services.bridge.robots import chain, eyes
@@ -62,6 +62,7 @@ def run(wanted: Wanted, connection: Connection, every_s: float) -> None:
                 os._exit(1)  # the bridge starts another
     except (EOFError, OSError):  # the bridge has ended
         _farewell(node, goal)
+    definitions.tidy()
     os._exit(0)  # threads of rospy would hold up the end
 
 

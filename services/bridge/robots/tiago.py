@@ -136,7 +136,7 @@ class Tiago(Part):
         self._to_bus: list[GotoResult] = []
         self._told: tuple[str, str] | None = None  # the goal under way, as the senses know it
         self._felt: Felt | None = None
-        self.due = 0.0
+        self.due = self._feel_due = 0.0
 
     def hear(self, heard: Heard, now: float) -> None:
         """See `Part`."""
@@ -173,8 +173,8 @@ class Tiago(Part):
         for one in self._to_ros:
             node.publish(one.topic, one.fields)
         self._to_ros.clear()
-        felt = list(self._feel(now)) if now >= self.due else []
-        self.due = now + EVERY_S
+        felt = list(self._feel(now)) if now >= self._feel_due else []
+        self.due = self._feel_due
         return [*self._news(), *felt]
 
     def statuses(self, now: float) -> list[Fields]:
@@ -233,6 +233,7 @@ class Tiago(Part):
 
     def _feel(self, now: float) -> Iterator[Message]:
         """What the senses said; keeps them running."""
+        self._feel_due = now + EVERY_S
         if self._child is None:
             return
         for said in self._child.said():
