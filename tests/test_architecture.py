@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -55,7 +56,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.ros_master": ("services.errors",),
     "services.ros_node": ("services.errors", "services.ros_master"),
     "services.vision": ("services.errors",),
-    "services.storage": ("services.errors",),
+    "services.storage": ("services.errors", "services.section"),
     "services.document": ("services.errors",),
     "services.secret_store": ("services.errors", "services.document"),
     "services.registry": (),
@@ -441,3 +442,10 @@ def test_the_layers_say_what_the_style_sheet_says(module: str, other: str, allow
 def test_a_new_part_must_be_given_its_place() -> None:
     with pytest.raises(pytest.fail.Exception, match="add one that says what it may import"):
         row("services.utils")
+
+
+def test_a_process_loads_no_library_that_its_service_does_not_use() -> None:
+    heavy = ("cv2", "numpy", "lark", "httpx", "starlette", "uvicorn", "pymysql", "rospy")
+    code = f"import sys, services.__main__; print(*(one for one in {heavy} if one in sys.modules))"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    assert loaded == []

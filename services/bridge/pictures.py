@@ -6,11 +6,11 @@ What that process does is in `darkroom.py`. While RTSP is off, or nobody on ROS 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from multiprocessing.connection import Connection
 
 from services import topics
-from services.bridge import darkroom
 from services.bridge.child import Child
-from services.bridge.darkroom import Done, Told, Wanted
+from services.bridge.hatch import Done, Told, Wanted
 from services.bridge.node import Node
 from services.bridge.part import Part, status
 from services.bridge.rules import Fields, Heard
@@ -29,7 +29,7 @@ class Pictures(Part):
     def __init__(self, wanted: Wanted) -> None:
         self._wanted = wanted
         self._told = {cam: Told(cam, "", 0.0) for cam in wanted.cameras}
-        self._child = Child("pictures", darkroom.run, wanted, EVERY_S)
+        self._child = Child("pictures", _develop, wanted, EVERY_S)
         self._done: Done | None = None
         self.due = 0.0
 
@@ -71,3 +71,10 @@ class Pictures(Part):
     def close(self) -> None:
         """Ends the process."""
         self._child.close()
+
+
+def _develop(wanted: Wanted, connection: Connection, every_s: float) -> None:
+    """In the process: OpenCV is loaded there, not in the bridge."""
+    from services.bridge import darkroom
+
+    darkroom.run(wanted, connection, every_s)

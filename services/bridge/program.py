@@ -1,77 +1,32 @@
-"""Puts the bridge together: its settings, the rules, the node, the parts. What it does is in `service.py`."""
+"""Puts the bridge together: the rules, the node, the parts. What it does is in `service.py`."""
 
 from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from functools import partial
-from pathlib import Path
-from typing import Annotated, Any
-
-from pydantic import Field, ValidationError, field_validator
 
 from services import __version__
 from services.bridge import arguments, mapfile, messages, robots, rulebook
 from services.bridge.confirm import Confirm
-from services.bridge.darkroom import Wanted
+from services.bridge.hatch import Wanted
 from services.bridge.items import Items
 from services.bridge.lenses import Lenses
 from services.bridge.missions import Missions
 from services.bridge.node import Outlet, Ports, ports
 from services.bridge.part import Part
 from services.bridge.pictures import Pictures
-from services.bridge.robots import Robot, Where
+from services.bridge.robots import Where
 from services.bridge.ros import RosNode
 from services.bridge.rules import Rule
 from services.bridge.service import Bridge
+from services.bridge.settings import Config
 from services.bridge.simulated import SimulatedNode
 from services.bridge.snapshots import Snapshots
 from services.bridge.tree import Tree
 from services.errors import ConfigError
-from services.home import Home
 from services.runner import Post
-from services.section import Section
-from services.topic import LEVELS
-from services.vision.frames import Mount
-
-
-class Hung(Section):
-    """How a camera hangs, as the bridge reads it from that camera's own section; faults in it are told there."""
-
-    model_config = {"extra": "ignore"}
-
-    mount: Mount | None = None
-    camera_info: Path | None = None
-
-
-class Config(Section):
-    """The bridge's section of the configuration."""
-
-    rules: str = "bridge.yaml"  # which topics are bridged, and how
-    node: str = Field(default="iot_bridge", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # its name in the ROS graph
-    master_uri: str | None = None  # http://host:11311; without it ROS_MASTER_URI of the environment
-    apartment: tuple[float, float, float] = (0.0, 0.0, 0.0)  # its origin on the robot's map: x, y in m, yaw in degrees
-    robot: str | None = None  # its name on the bus, for /iot_mission; None: no missions here
-    robots: dict[Annotated[str, Field(pattern=LEVELS["robot"])], Robot] = {}  # that we speak for, by name on the bus
-    map: Path | None = None  # a map_server YAML, shown on /map; relative to the configuration
-    simulated: bool = False  # a ROS node in memory, where there is no ROS
-    name: str = "bridge"
-    home: Home
-    cameras: tuple[str, ...] = ()
-    camera_sections: dict[str, Hung] = {}
-    folder: Path
-    state: Path | None = None
-
-    @field_validator("camera_sections", mode="before")
-    @classmethod
-    def what_can_be_understood(cls, sections: Any) -> dict[str, Hung]:
-        """The rest is not ours: the password above all."""
-        found = {}
-        for cam, section in sections.items() if isinstance(sections, dict) else ():
-            with suppress(ValidationError):
-                found[str(cam)] = Hung.model_validate(section)
-        return found
 
 
 def check(config: Config) -> None:

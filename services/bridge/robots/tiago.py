@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from math import inf
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
@@ -80,12 +81,18 @@ def check(settings: Section, folder: Path) -> None:
 def part(robot: str, settings: Section, where: Where) -> Tiago:
     """See `robots/__init__`; ConfigError when its places cannot be read."""
     from services import robot_places
-    from services.bridge.robots import senses
 
     assert isinstance(settings, Settings)
     given = settings.places
     places = robot_places.read(where.folder / given)[0] if given else robot_places.RobotPlaces()
-    return Tiago(robot, settings, places, Child(robot, senses.run, wanted(robot, settings, where), 1.0))
+    return Tiago(robot, settings, places, Child(robot, _feel, wanted(robot, settings, where), 1.0))
+
+
+def _feel(wanted: Wanted, connection: Connection, every_s: float) -> None:
+    """In the process: OpenCV is loaded there, not in the bridge."""
+    from services.bridge.robots import senses
+
+    senses.run(wanted, connection, every_s)
 
 
 def wanted(robot: str, settings: Settings, where: Where) -> Wanted:

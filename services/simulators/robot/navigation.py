@@ -5,12 +5,13 @@ Not here: goals that come and go on ROS (`nodes.py`), the way (`route.py`) and t
 
 from __future__ import annotations
 
-from math import hypot
+from itertools import pairwise
+from math import dist, hypot
 from random import Random
 
 from services.floor import XY, Grid
 from services.simulators.robot.body import Body
-from services.simulators.robot.route import length, route
+from services.simulators.robot.route import route
 
 RECOVERY_S = 3.0  # of turning and clearing, until it gives up
 YAW_SIGMA_DEG = 2.0  # it is content within some tolerance
@@ -38,7 +39,7 @@ class Navigation:
             return
         if self.fails > 0:
             self.fails -= 1
-            self._left = length(way) / 2
+            self._left = sum(dist(one, other) for one, other in pairwise(way)) / 2
         self.body.set_out(way[1:], yaw_deg + self._draw.gauss(0, YAW_SIGMA_DEG))
 
     def stop(self) -> None:
