@@ -34,6 +34,7 @@ CORE = (
 FILES_OF_OURS = ("services.document", "services.secret_store")  # reading YAML, finding secrets
 SHELL = ("services.config", "services.registry", "services.runner", "services.aside", "services.process")
 BUSES = ("services.bus.mqtt", "services.bus.memory", "services.bus.connection", "services.bus.outbox")
+ROS_GRAPH = ("services.ros_master", "services.ros_node")
 SERVICE = (*CORE, "services.runner", "services.document")  # they meet on the bus, never in an import
 LAYERS: dict[str, tuple[str, ...]] = {
     "services": (),
@@ -52,6 +53,8 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.bus.memory": (*CORE, "services.bus.outbox"),
     "services.bus.connection": CORE,
     "services.bus.outbox": CORE,
+    "services.ros_master": ("services.errors",),
+    "services.ros_node": ("services.errors", "services.ros_master"),
     "services.vision": ("services.errors",),
     "services.storage": ("services.errors", "services.section"),
     "services.document": ("services.errors",),
@@ -62,14 +65,14 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
     "services.runner": (*CORE, "services.aside"),
     "services.camera": (*SERVICE, "services.vision"),
-    "services.bridge": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
+    "services.bridge": (*SERVICE, *ROS_GRAPH, "services.vision", "services.floor", "services.robot_places"),
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage"),
     "services.openhab": SERVICE,
     "services.hubs": SERVICE,
     "services.mission": (*SERVICE, "services.floor", "services.robot_places"),
     "services.dashboard": SERVICE,
-    "services.simulators": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
+    "services.simulators": (*SERVICE, *ROS_GRAPH, "services.vision", "services.floor", "services.robot_places"),
     "services.process": (*CORE, *BUSES, *SHELL),
     "services.supervisor": ("services.process", "services.config"),
     "services.client": (*CORE, *BUSES, *SHELL),
@@ -84,7 +87,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
 
 # One library, one door: where a library may be imported. A name alone is a module, one with a dot at its end all in it.
 EVERYWHERE = ("services", "services.")
-ROS = ("services.bridge.", "services.simulators.robot")
+ROS = ("services.ros_node", "services.bridge.", "services.simulators.robot.")
 DOORS: dict[str, tuple[str, ...]] = {
     "pydantic": EVERYWHERE,
     "pydantic_core": EVERYWHERE,
@@ -105,6 +108,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.bridge.images",
         "services.floor",
         "services.simulators.camera.",
+        "services.simulators.robot.eye",
     ),
     "av": ("services.camera.video.rtsp",),
     "gi": ("services.simulators.camera.rtsp.",),
@@ -124,7 +128,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "starlette": ("services.dashboard.http",),
     "uvicorn": ("services.dashboard.http",),
     "pytest": ("services.pytest_plugin",),
-    **dict.fromkeys(("rospy", "rosgraph", "rosmaster", "genpy", "roslib", "actionlib", "tf2_ros"), ROS),
+    **dict.fromkeys(("rospy", "rosgraph", "rosmaster", "genpy", "genmsg", "roslib", "actionlib", "tf2_ros"), ROS),
     **dict.fromkeys(("std_msgs", "diagnostic_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs", "tf2_msgs"), ROS),
     **dict.fromkeys(("std_srvs", "actionlib_msgs", "move_base_msgs"), ROS),
 }
@@ -164,7 +168,8 @@ PURE = (
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
     "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules", "services.bridge.frames", "services.bridge.multipart",
-    "services.bridge.confirm", "services.bridge.pace", "services.bridge.items", "services.bridge.template",
+    "services.bridge.confirm", "services.bridge.pace", "services.bridge.robots.actions",
+    "services.bridge.robots.chain", "services.bridge.robots.goals", "services.bridge.items", "services.bridge.template",
     "services.persistence.rows", "services.persistence.seen", "services.persistence.strategies",
     "services.persistence.cron", "services.persistence.filters", "services.persistence.decisions",
     "services.history.answers", "services.history.plot", "services.storage.reading", *OPENHAB_PURE,
@@ -173,6 +178,7 @@ PURE = (
     "services.mission.moment", "services.mission.standing", "services.mission.memory", "services.mission.telling",
     "services.simulators.agenda", "services.simulators.climate", "services.simulators.robot.route",
     "services.simulators.robot.plan", "services.simulators.robot.sight", "services.simulators.robot.body",
+    "services.simulators.robot.navigation",
     "services.simulators.devices", "services.simulators.life",
 )  # fmt: skip
 IMPURE = (

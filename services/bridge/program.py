@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from functools import partial
+from pathlib import Path
 
 from services import __version__, robot_places
-from services.bridge import arguments, mapfile, messages, rulebook
+from services.bridge import arguments, mapfile, messages, robots, rulebook
 from services.bridge.confirm import Confirm
 from services.bridge.hatch import Wanted
 from services.bridge.items import Items
@@ -16,6 +18,7 @@ from services.bridge.missions import Missions
 from services.bridge.node import Outlet, Ports, ports
 from services.bridge.part import Part
 from services.bridge.pictures import Pictures
+from services.bridge.robots import Where
 from services.bridge.ros import RosNode
 from services.bridge.rules import Rule
 from services.bridge.service import Bridge
@@ -32,11 +35,13 @@ def check(config: Config) -> None:
     """ConfigError with every fault of the rules; their types are checked where ROS is installed."""
     known = _types(config) if importlib.util.find_spec("genpy") else rulebook.unchecked
     faults: list[str] = []
-    for load in (
+    loads: list[Callable[[], object]] = [
         lambda: rulebook.load(config.folder / config.rules, config.cameras, known),
         lambda: _relation(config),
         lambda: mapfile.load(shown) if (shown := _map(config)) else None,
-    ):
+        *(partial(robots.check, one, config.folder) for one in config.robots.values()),
+    ]
+    for load in loads:
         try:
             load()
         except ConfigError as error:
@@ -71,6 +76,9 @@ def _parts(config: Config) -> tuple[Part, ...]:
         parts.append(Lenses(config.cameras))
     if config.robot is not None:
         parts.append(Missions(config.robot))
+    if not config.simulated:  # without ROS the robot is on the bus itself
+        where = Where(arguments.name(config.node), config.master_uri, config.folder, config.state)
+        parts += [robots.part(name, one, where) for name, one in config.robots.items()]
     if not config.simulated and (config.cameras or _map(config)):
         parts.append(Pictures(_wanted(config)))
     return tuple(parts)

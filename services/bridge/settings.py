@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field, ValidationError, field_validator
 
+from services.bridge.robots import Robot
 from services.home import Home
 from services.section import Section
+from services.topic import LEVELS
 from services.vision.frames import Mount
 
 
@@ -32,6 +34,7 @@ class Config(Section):
     places: Path | None = None  # the robot's file: its map, shown on /map, and where the apartment lies in it
     map: Path | None = None  # a map_server YAML to be shown instead; relative to the configuration
     apartment: None = None  # until 0.1 the relation stood here, and a second time in the robot's file
+    robots: dict[Annotated[str, Field(pattern=LEVELS["robot"])], Robot] = {}  # that we speak for, by name on the bus
     simulated: bool = False  # a ROS node in memory, where there is no ROS
     name: str = "bridge"
     home: Home
