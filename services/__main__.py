@@ -17,7 +17,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, topics
 from services.bus import Message
-from services.command_line import calibrate, mission, openhab, stored
+from services.command_line import calibrate, mission, openhab, secrets, stored
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -80,7 +80,11 @@ def demo(
 @app.command(epilog="Example: apartment check --config config/apartment.yaml")
 def check(config: Config = CONFIG) -> None:
     """Check a configuration and every file that it names: lists every fault with file and line."""
+    from services.credentials import strength
+
     apartment = load(config, deep=True)
+    if weak := strength.faults(apartment):
+        raise ConfigError(weak)
     cameras = ", ".join(apartment.cameras) or "none"
     out.print(f"{config}: good. Services: {', '.join(apartment.instances)}. Cameras: {cameras}.")
 
@@ -194,6 +198,7 @@ stored.add_to(app)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(mission.app, name="mission")
 app.add_typer(openhab.app, name="openhab")
+app.add_typer(secrets.app, name="secrets")
 
 
 def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:

@@ -8,12 +8,15 @@ from __future__ import annotations
 import base64
 import hashlib
 import os
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from services.registry import REGISTRY
 from services.topics import TABLE, Topic
 
+CONF = Path(__file__).parents[1] / "mosquitto" / "mosquitto.conf"
+TLS_CONF = CONF.with_name("tls.conf")
 PLAYS = {row.name: row.plays for row in REGISTRY if row.plays}
 ITERATIONS = 101  # of PBKDF2, as mosquitto_passwd of Debian 12 writes
 
@@ -85,6 +88,21 @@ def write_passwords(file: Path, passwords: Mapping[str, str]) -> None:
 
 
 def write_private(file: Path, text: str) -> None:
-    """Writes a file with mode 0600 from its first byte on."""
-    with open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w", encoding="utf-8") as output:
+    """Writes a file with mode 0600 from its first byte on; whoever reads meanwhile sees the old one or the new one."""
+    beside = file.with_name(f".{file.name}.{os.getpid()}")
+    beside.unlink(missing_ok=True)
+    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as output:
         output.write(text)
+        output.flush()
+        os.fsync(output.fileno())
+    beside.replace(file)
+
+
+def broker_conf(folder: Path, data: Path | None = None, *, encrypted: bool = True) -> str:
+    """`mosquitto.conf` as the project has it, with its files in `folder` and its memory in `data` (else there too).
+
+    `encrypted`: with the listener for other machines, whose certificate and key stand in `folder`.
+    """
+    text = CONF.read_text(encoding="utf-8") + ("\n" + TLS_CONF.read_text(encoding="utf-8") if encrypted else "")
+    text = re.sub(r"(?m)^(password_file|acl_file|certfile|keyfile) ", rf"\1 {folder.absolute()}/", text)
+    return re.sub(r"(?m)^persistence_location .*", f"persistence_location {(data or folder).absolute()}/", text)

@@ -57,6 +57,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.secret_store": ("services.errors", "services.document"),
     "services.registry": (),
     "services.access": (*CORE, "services.registry"),
+    "services.credentials": (*CORE, "services.access", "services.config", *FILES_OF_OURS),
     "services.aside": CORE,
     "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
     "services.runner": (*CORE, "services.aside"),
@@ -111,6 +112,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "sqlite3": ("services.storage.sqlite",),
     "croniter": ("services.persistence.cron",),
     "yaml": ("services.document",),
+    "cryptography": ("services.credentials.certificates",),
     "lark": ("services.openhab.check.",),
     "typer": ("services.__main__", "services.command_line."),
     "rich": (
