@@ -58,12 +58,13 @@ def _add(rows: dict[str, str], account: str, topic: Topic, *, writes: bool, read
     """A service's own topics carry its name in the level `<service>` or `<cam>`."""
     camera = account.removeprefix("camera-") if account.startswith("camera-") else None
     if "<service>" in topic.writers:
-        rows[topic.filter_for(service=account)] = "readwrite"
+        rows[topic.filter_for(service=account)] = "write"
         if reads:
-            rows.setdefault(topic.filter, "read")
+            rows[topic.filter] = "read"
         return
     own = {"cam": camera} if camera and "cam" in topic.names else {}
-    rows[topic.filter_for(**own)] = "readwrite" if writes and reads else "write" if writes else "read"
+    right = "readwrite" if writes and reads else "write" if writes else "read"
+    rows.update(dict.fromkeys(topic.filters_for(**own), right))
 
 
 def _may(account: str, roles: tuple[str, ...]) -> bool:
