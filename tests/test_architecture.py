@@ -70,7 +70,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.mission": (*SERVICE, "services.floor", "services.robot_places"),
     "services.dashboard": SERVICE,
     "services.simulators": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
-    "services.process": (*CORE, *BUSES, *SHELL),
+    "services.process": (*CORE, *BUSES, *SHELL, "services.access"),
     "services.supervisor": ("services.process", "services.config"),
     "services.client": (*CORE, *BUSES, *SHELL),
     "services.peers": (*CORE, "services.access"),

@@ -117,6 +117,7 @@ def mouth(broker: Broker, account: str, *, name: str = "", will: str = "") -> It
     finally:
         one.client.disconnect()
         one.client.loop_stop()
+        del one.client  # else its sockets are closed when the collector comes round
 
 
 def _topics(account: str, *, write: bool) -> set[str]:
