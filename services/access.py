@@ -88,12 +88,12 @@ def write_passwords(file: Path, passwords: Mapping[str, str]) -> None:
     write_private(file, "".join(f"{password_line(account, password)}\n" for account, password in passwords.items()))
 
 
-def write_private(file: Path, text: str) -> None:
+def write_private(file: Path, text: str | bytes) -> None:
     """Writes a file with mode 0600 from its first byte on; whoever reads meanwhile sees the old one or the new one."""
     beside = file.with_name(f".{file.name}.{os.getpid()}")
     beside.unlink(missing_ok=True)
-    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as output:
-        output.write(text)
+    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as output:
+        output.write(text.encode() if isinstance(text, str) else text)
         output.flush()
         os.fsync(output.fileno())
     beside.replace(file)

@@ -41,9 +41,7 @@ def init(
     """Make what is missing: a password for every account, the broker's files, an authority and its certificates."""
     from services.credentials import folder
 
-    for line in folder.fill(
-        _folder(out_folder), config, [*(host or []), *_own_hosts()], datetime.now(UTC), force=force
-    ):
+    for line in folder.fill(_folder(out_folder), config, [*(host or []), *own_hosts()], datetime.now(UTC), force=force):
         out.print(line, markup=False)
 
 
@@ -75,7 +73,7 @@ def _folder(path: Path | None) -> Folder:
     return Folder(path or secret_store.home())
 
 
-def _own_hosts() -> list[str]:
+def own_hosts() -> list[str]:
     """How this machine is called in its own network, and by itself."""
     name = socket.gethostname()
     return list(dict.fromkeys((name, f"{name}.local", "localhost", "127.0.0.1", "::1")))
