@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import signal
 import sys
+from json import dumps
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,7 +23,7 @@ from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
 from services.supervisor import Supervisor, commands, processes
-from services.topics import page
+from services.topics import asyncapi, page
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -94,6 +95,7 @@ def topics_(
     write: Annotated[Path | None, typer.Option(help="Write the table there.")] = None,
     acl: Annotated[Path | None, typer.Option(help="Write the broker's access list there.")] = None,
     passwords: Annotated[Path | None, typer.Option(help="Write the broker's password file there.")] = None,
+    as_asyncapi: Annotated[bool, typer.Option("--asyncapi", help="Show it as an AsyncAPI 3 document.")] = False,
     config: Config = CONFIG,
 ) -> None:
     """Show the table of topics, or write the files that come from it and from the accounts of the configuration."""
@@ -104,7 +106,9 @@ def topics_(
     if passwords is not None:
         accounts = load(config).bus.accounts
         access.write_passwords(passwords, {name: one.get_secret_value() for name, one in accounts.items() if one})
-    if write is acl is passwords is None:
+    if as_asyncapi:
+        _say(dumps(asyncapi.document(), indent=1))
+    elif write is acl is passwords is None:
         _say(page.markdown())
 
 
