@@ -17,7 +17,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, topics
 from services.bus import Message
-from services.command_line import calibrate, mission, openhab, stored
+from services.command_line import calibrate, dashboard, mission, openhab, stored
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -192,6 +192,7 @@ def probe(
 
 stored.add_to(app)
 app.add_typer(calibrate.app, name="calibrate")
+app.add_typer(dashboard.app, name="dashboard")
 app.add_typer(mission.app, name="mission")
 app.add_typer(openhab.app, name="openhab")
 

@@ -22,6 +22,7 @@ from services.topics import CAMERA_STATUS
 
 CONFIG = Path(__file__).parents[1] / "config"
 USUAL_BROKER_PORT = 1883
+USUAL_DASHBOARD_PORT = 8088
 
 
 @dataclass
@@ -82,6 +83,8 @@ def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
     parts.environment["APARTMENT_CAMERA_PORT"] = str(free_port())
     parts.environment["APARTMENT_CAMERA_RTSP_PORT"] = str(free_port())
     parts.environment["APARTMENT_SIDE_DOOR_PORT"] = str(free_port())
+    taken = not real or answers(USUAL_DASHBOARD_PORT)
+    parts.environment["APARTMENT_DASHBOARD_PORT"] = "0" if taken else str(USUAL_DASHBOARD_PORT)
     with ExitStack() as stack:
         for start in (_start_broker, _start_database, _start_ros):
             start(stack, parts, real)
