@@ -8,7 +8,19 @@ from dataclasses import replace
 import pytest
 
 from services.errors import BadMessage
-from services.storage import Batch, CameraOrder, Diagnostic, Item, Sample, Scan, Sighting, Storage, open_storage
+from services.storage import (
+    Batch,
+    CameraOrder,
+    Diagnostic,
+    Item,
+    Mission,
+    Sample,
+    Scan,
+    Sighting,
+    Storage,
+    open_storage,
+    reading,
+)
 from tests.databases import Database
 
 T0 = 1_769_839_200_000_000  # 2026-01-31 06:00 UTC
@@ -53,6 +65,7 @@ def test_writing_a_batch_again_changes_nothing(storage: Storage, database: Datab
             Sighting("s1", "ip1", 582, "DICT_5X5_1000", "Kitchen", T0, x=1.0),
             Scan("s1", "ip1", "done", "582", "582", T0, T0 + MINUTE, 8, 8),
             CameraOrder("o1", "ip1", "Goto", "Kitchen", "done", None, T0),
+            Mission("m1", "tiago", 582, "found", "", "Sofa", 1.0, 2.0, 0.5, "tiago", T0, T0 + MINUTE, "[]"),
             Diagnostic("camera/ip1", T0, 0, "fine", None),
         ],
     )
@@ -60,12 +73,12 @@ def test_writing_a_batch_again_changes_nothing(storage: Storage, database: Datab
     before = content(database)
     storage.write(batch)
     assert content(database) == before
-    assert [len(rows) for rows in before] == [2, 1, 1, 1, 1]
+    assert [len(rows) for rows in before] == [2, 1, 1, 1, 1, 1]
 
 
 def content(database: Database) -> list[list[object]]:
     """Every row of the tables that batches go to."""
-    tables = ("sample", "sighting", "scan", "camera_order", "diagnostic")
+    tables = ("sample", "sighting", "scan", "camera_order", "mission", "diagnostic")
     return [list(database.rows(f"SELECT * FROM {table} ORDER BY 1, 2")) for table in tables]
 
 
@@ -125,6 +138,25 @@ def test_a_scan_follows_its_states_until_it_has_ended(storage: Storage, database
     assert rows == [("done", "582", 8)]
     seconds = {"sqlite": "(ended-started)/1000000", "mariadb": "TIMESTAMPDIFF(SECOND,started,ended)"}[database.kind]
     assert database.rows(f"SELECT {seconds} FROM scan") == [(60,)]
+
+
+def test_a_mission_follows_its_states_until_it_has_ended(storage: Storage) -> None:
+    going = Mission("m1", "tiago", 582, "go", "to Sofa", "Sofa", None, None, None, None, T0, None, None)
+    found = replace(going, state="found", reason="seen", x=1.5, y=2.0, z=0.5, seen_by="tiago", ended=T0 + MINUTE)
+    storage.write(Batch(rows=[replace(going, state="look", place=None), replace(going, started=T0 + 7)]))
+    assert reading.missions(storage, 0, T0 + MINUTE, 9) == [going]
+    storage.write(Batch(rows=[replace(going, state="scan", place=None)]))
+    assert reading.missions(storage, 0, T0 + MINUTE, 9) == [replace(going, state="scan")]
+    storage.write(Batch(rows=[replace(found, story='[[0, "go", "to Sofa"]]')]))
+    storage.write(Batch(rows=[going, replace(found, state="failed", place="Hall", ended=T0 + 2 * MINUTE)]))
+    assert reading.missions(storage, 0, T0 + MINUTE, 9) == [replace(found, story='[[0, "go", "to Sofa"]]')]
+
+
+def test_the_newest_missions_of_a_span_are_told_oldest_first(storage: Storage) -> None:
+    one = Mission("m0", "tiago", 1, "found", None, None, None, None, None, None, T0, T0, None)
+    storage.write(Batch(rows=[replace(one, mission=f"m{n}", started=T0 + n * MINUTE) for n in range(5)]))
+    told = reading.missions(storage, T0 + MINUTE, T0 + 4 * MINUTE, 2)
+    assert [mission.mission for mission in told] == ["m2", "m3"]
 
 
 def test_an_order_keeps_its_first_time_and_its_final_state(storage: Storage, database: Database) -> None:
@@ -189,7 +221,7 @@ def test_what_was_written_is_there_for_the_next_who_opens(storage: Storage, data
     again = open_storage(database.address)
     assert again.last("Lab_Temp") == Sample("Lab_Temp", T0, 21.5, None)
     assert again.items["Lab_Temp"].unit == "°C"
-    assert database.rows("SELECT MAX(version) FROM schema_version") == [(2,)]
+    assert database.rows("SELECT MAX(version) FROM schema_version") == [(3,)]
     again.close()
 
 
