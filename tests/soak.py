@@ -25,6 +25,7 @@ from tests import trials
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
 from tests.camera.scan.scenes import scan_a_scene
+from tests.mission import trials as mission_trials
 from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
 from tests.vision import mount_trials, positions
@@ -147,6 +148,8 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
     "calibration": (mount_trials.calibrations, 150, "mm off, of the mount"),
     "scenes": (lambda: nullcontext(lambda rng: scan_a_scene(rng)), 24, "s, virtual"),
+    "flats": (lambda: nullcontext(mission_trials.a_flat), 20, "s, virtual"),
+    "real-flats": (lambda: nullcontext(mission_trials.on_real_parts), 2, "x the virtual time"),
     "detector": (detector_trials.in_numbers, 100, "false markers in 50 frames"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
