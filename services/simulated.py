@@ -25,6 +25,7 @@ CONFIG = Path(__file__).parents[1] / "config"
 USUAL_BROKER_PORT = 1883
 ROBOT = ("rospy", "actionlib", "move_base_msgs")  # what bridge and simulated robot need besides a master
 ROBOT_PACKAGES = "python3-rospy python3-actionlib python3-move-base-msgs"
+USUAL_DASHBOARD_PORT = 8088
 
 
 @dataclass
@@ -85,6 +86,8 @@ def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
     parts.environment["APARTMENT_CAMERA_PORT"] = str(free_port())
     parts.environment["APARTMENT_CAMERA_RTSP_PORT"] = str(free_port())
     parts.environment["APARTMENT_SIDE_DOOR_PORT"] = str(free_port())
+    taken = not real or answers(USUAL_DASHBOARD_PORT)
+    parts.environment["APARTMENT_DASHBOARD_PORT"] = "0" if taken else str(USUAL_DASHBOARD_PORT)
     with ExitStack() as stack:
         for start in (_start_broker, _start_database, _start_ros):
             start(stack, parts, real)

@@ -6,8 +6,9 @@ import importlib.util
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import partial
+from pathlib import Path
 
-from services import __version__
+from services import __version__, robot_places
 from services.bridge import arguments, mapfile, messages, robots, rulebook
 from services.bridge.confirm import Confirm
 from services.bridge.hatch import Wanted
@@ -26,6 +27,7 @@ from services.bridge.simulated import SimulatedNode
 from services.bridge.snapshots import Snapshots
 from services.bridge.tree import Tree
 from services.errors import ConfigError
+from services.robot_places import Relation
 from services.runner import Post
 
 
@@ -35,7 +37,8 @@ def check(config: Config) -> None:
     faults: list[str] = []
     loads: list[Callable[[], object]] = [
         lambda: rulebook.load(config.folder / config.rules, config.cameras, known),
-        lambda: mapfile.load(config.folder / config.map) if config.map else None,
+        lambda: _relation(config),
+        lambda: mapfile.load(shown) if (shown := _map(config)) else None,
         *(partial(robots.check, one, config.folder) for one in config.robots.values()),
     ]
     for load in loads:
@@ -69,14 +72,14 @@ def _parts(config: Config) -> tuple[Part, ...]:
     if config.cameras:
         mounts = {cam: one.mount for cam, one in config.camera_sections.items() if one.mount is not None}
         snapshots = config.state / "snapshots" if config.state else None
-        parts += [Tree(config.cameras, mounts, config.apartment), Snapshots(config.cameras, snapshots)]
+        parts += [Tree(config.cameras, mounts, _relation(config)), Snapshots(config.cameras, snapshots)]
         parts.append(Lenses(config.cameras))
     if config.robot is not None:
         parts.append(Missions(config.robot))
     if not config.simulated:  # without ROS the robot is on the bus itself
         where = Where(arguments.name(config.node), config.master_uri, config.folder, config.state)
         parts += [robots.part(name, one, where) for name, one in config.robots.items()]
-    if not config.simulated and (config.cameras or config.map):
+    if not config.simulated and (config.cameras or _map(config)):
         parts.append(Pictures(_wanted(config)))
     return tuple(parts)
 
@@ -88,8 +91,23 @@ def _wanted(config: Config) -> Wanted:
         cam: ("" if cam == config.cameras[0] else f"/{cam}", config.folder / files[cam] if cam in files else None)
         for cam in config.cameras
     }
-    map_file = config.folder / config.map if config.map else None
-    return Wanted(f"{arguments.name(config.node)}_pictures", config.master_uri, cameras, map_file)
+    return Wanted(f"{arguments.name(config.node)}_pictures", config.master_uri, cameras, _map(config))
+
+
+def _relation(config: Config) -> Relation:
+    """Where the apartment lies in the robot's map; its own origin where nobody says."""
+    if config.places is None:
+        return Relation()
+    return robot_places.places(config.folder / config.places).apartment_to_map
+
+
+def _map(config: Config) -> Path | None:
+    """The map that is shown: the bridge's own, else the robot's."""
+    if config.map is not None or config.places is None:
+        return config.folder / config.map if config.map else None
+    file = config.folder / config.places
+    named = robot_places.places(file).map
+    return file.parent / named if named else None
 
 
 def _all_ports(config: Config, rules: tuple[Rule, ...], parts: tuple[Part, ...]) -> Ports:
