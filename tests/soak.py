@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -109,8 +110,10 @@ def lost_by_the_broker(one: writer_trials.Site, rng: random.Random, *, backlog: 
 def missions() -> Iterator[Turn]:
     """A mission from the bedroom in a new flat each turn, on real parts, with an accident in the middle."""
 
-    def turn(rng: random.Random) -> float:
-        accident = rng.choice(mission_trials.ACCIDENTS)
+    accidents = cycle(mission_trials.ACCIDENTS)
+
+    def turn(_: random.Random) -> float:
+        accident = next(accidents)
         with tempfile.TemporaryDirectory() as name, mission_trials.flat(Path(name), mission_trials.BEDROOM) as one:
             end, seconds = mission_trials.find(one, 582, accident)
         Console().print(f"accident {accident}: {end.state} after {seconds:.1f} s: {end.reason}")
