@@ -71,6 +71,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.dashboard": SERVICE,
     "services.simulators": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
     "services.process": (*CORE, *BUSES, *SHELL, "services.access"),
+    "services.backup": (*CORE, *SHELL, "services.storage"),
     "services.installation": (
         *CORE,
         *SHELL,
