@@ -18,7 +18,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, topics
 from services.bus import Message
-from services.command_line import backup, calibrate, install, mission, openhab, secrets, stored
+from services.command_line import backup, calibrate, dashboard, install, mission, openhab, secrets, stored
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -203,6 +203,7 @@ app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
 app.command(epilog="Example: apartment restore apartment.zip")(backup.restore)
 app.command(epilog="Example: apartment install --dry-run")(install.install)
 app.add_typer(calibrate.app, name="calibrate")
+app.add_typer(dashboard.app, name="dashboard")
 app.add_typer(mission.app, name="mission")
 app.add_typer(openhab.app, name="openhab")
 app.add_typer(secrets.app, name="secrets")

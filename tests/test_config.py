@@ -45,7 +45,7 @@ def test_the_simulated_apartment_needs_nothing_from_outside() -> None:
 
 def test_the_example_is_good_once_its_secrets_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
     missing = faults(CONFIG / "apartment.yaml")
-    assert len(missing) == 9
+    assert len(missing) == 10
     assert all("expected ${" in fault and "got nothing" in fault for fault in missing)
     for fault in missing:
         monkeypatch.setenv(fault.split("${")[1].split("}")[0], "invented")
@@ -74,6 +74,13 @@ def test_six_faults_of_six_kinds_are_all_told_with_file_and_line(folder: Path) -
     assert "default_camera: expected one of the cameras (ip1), got 'ip7'" in by_place[places[3]]
     assert "expected ${NOT_ANYWHERE} in the environment" in by_place[places[4]]
     assert "items.Kitchen-Light: expected a name of letters, digits and _" in by_place[places[5]]
+
+
+def test_where_the_apartment_lies_is_not_said_to_the_bridge_any_more(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, "  rules: bridge.yaml", "  apartment: [1, 2, 3]\n  rules: bridge.yaml")
+    (told,) = faults(file)
+    assert told.startswith(f"{file}:{line}: bridge.apartment: expected places: FILE, whose apartment_to_map")
 
 
 def test_several_cameras_are_simulated_from_one_file_each_in_a_service_of_its_own(folder: Path) -> None:

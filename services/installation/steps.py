@@ -18,7 +18,7 @@ from services.config import Apartment
 from services.credentials.folder import Folder, fill
 from services.errors import ApartmentError, ConfigError
 from services.installation import units
-from services.installation.layout import BROKER, STATE, SYSTEM, TARGET, UNITS, parts
+from services.installation.layout import BROKER, GROUP, STATE, SYSTEM, TARGET, UNITS, parts
 
 SECRETS = SYSTEM / "secrets"
 BROKER_FILES = ("passwords", "acl", "server.crt", "server.key")
@@ -68,10 +68,12 @@ def files(apartment: Apartment, python: Path) -> list[Step]:
     ]
 
 
+ACCOUNTS = Step(command=("systemd-sysusers",))  # before files are given to them
+
+
 def commands() -> list[Step]:
     """What makes systemd know them."""
     wanted = (
-        ("systemd-sysusers",),
         ("systemd-tmpfiles", "--create", "apartment.conf"),
         ("systemctl", "daemon-reload"),
         ("systemctl", "enable", TARGET, "apartment-renew.timer"),
@@ -88,8 +90,10 @@ def secrets(config: Path, hosts: Sequence[str], root: Path) -> Iterator[Step | s
         text = (folder.path / "broker" / name).read_text(encoding="utf-8")
         yield Step(BROKER / name, text, 0o600, "mosquitto")
     yield Step(BROKER / "mosquitto.conf", access.broker_conf(BROKER, Path("/var/lib/mosquitto")), 0o600, "mosquitto")
-    authority = folder.authority.read_text(encoding="ascii")
-    yield Step(SYSTEM / "ca.crt", authority)
+    yield Step(SYSTEM / "ca.crt", folder.authority.read_text(encoding="ascii"))
+    if (dashboard := folder.pair("dashboard")) is not None:
+        yield Step(SYSTEM / "dashboard.crt", dashboard.certificate)
+        yield Step(SYSTEM / "dashboard.key", dashboard.key, 0o640, f":{GROUP}")
 
 
 def do(step: Step, root: Path) -> None:
@@ -104,8 +108,12 @@ def do(step: Step, root: Path) -> None:
         file.parent.chmod(0o700)
     access.write_private(file, step.text)
     if step.owner and root == Path("/") and os.geteuid() == 0:
-        for path in (file.parent, file):
-            shutil.chown(path, step.owner)
+        user, _, group = step.owner.partition(":")
+        for path in (file.parent, file) if user else (file,):
+            if user:
+                shutil.chown(path, user)
+            if group:
+                shutil.chown(path, group=group)
     file.chmod(step.mode)
 
 

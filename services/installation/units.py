@@ -103,7 +103,7 @@ WantedBy=multi-user.target
 
 def renewal(python: Path, secrets: Path) -> dict[str, str]:
     """Certificates are renewed long before they end; those who use them read them again."""
-    broker = BROKER / "server"
+    broker, page = BROKER / "server", SYSTEM / "dashboard"
     return {
         "apartment-renew.service": f"""\
 [Unit]
@@ -114,9 +114,12 @@ Type=oneshot
 ExecStart={python} -m services secrets renew --within 60 --out {secrets}
 ExecStart=/usr/bin/install -o mosquitto -m 0600 {secrets}/broker/server.key {broker}.key
 ExecStart=/usr/bin/install -o mosquitto -m 0600 {secrets}/broker/server.crt {broker}.crt
+ExecStart=/usr/bin/install -g {GROUP} -m 0640 {secrets}/dashboard/server.key {page}.key
+ExecStart=/usr/bin/install -m 0644 {secrets}/dashboard/server.crt {page}.crt
 ExecStart=-/usr/bin/systemctl --no-block reload-or-restart mosquitto.service
+ExecStart=-/usr/bin/systemctl --no-block try-restart apartment-dashboard.service
 UMask=0077
-ReadWritePaths={secrets} {BROKER}
+ReadWritePaths={secrets} {SYSTEM}
 CapabilityBoundingSet=CAP_CHOWN CAP_FOWNER CAP_DAC_OVERRIDE
 {"".join(line for line in HARDENED.splitlines(keepends=True) if "Capabilit" not in line and "~" not in line)}\
 RestrictAddressFamilies=AF_UNIX
