@@ -89,7 +89,7 @@ def test_systemd_finds_no_unit_more_exposed_than_3_of_10(machine: Path) -> None:
 
 
 def test_what_is_secret_is_for_its_owner_only(machine: Path) -> None:
-    for folder in ("etc/apartment/secrets", "etc/apartment/broker"):
+    for folder in ("etc/apartment/secrets", "etc/apartment/broker", "etc/apartment/database"):
         for path in (machine / folder, *(machine / folder).rglob("*")):
             assert path.stat().st_mode & 0o077 == 0, path
     texts = [path.read_text() for path in (machine / "etc/systemd").rglob("*") if path.is_file()]
