@@ -75,6 +75,8 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.dashboard": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
     "services.simulators": (*SERVICE, *ROS_GRAPH, "services.vision", "services.floor", "services.robot_places"),
     "services.process": (*CORE, *BUSES, *SHELL, "services.access"),
+    "services.doctor": ("services",),
+    "services.backup": (*CORE, *SHELL, "services.storage"),
     "services.installation": (
         *CORE,
         *SHELL,
