@@ -104,6 +104,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.camera.video.",
         "services.bridge.images",
         "services.floor",
+        "services.dashboard.thumbnail",
         "services.simulators.camera.",
     ),
     "av": ("services.camera.video.rtsp",),
