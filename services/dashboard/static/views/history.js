@@ -30,7 +30,8 @@ export function show(root, { apartment }) {
     const csv = h("a", { class: "csv", download: true, "aria-label": `${item.label} as CSV` }, "CSV");
     return { name, item, box, csv, row: h("li", {}, box, h("label", { for: `item-${name}` }, h("span", { class: "key" }), item.label), csv) };
   });
-  root.append(head("History", spent, h("div", { class: "row spans" }, buttons, from, h("span", { class: "hint" }, "to"), to, back)),
+  root.append(head("History", spent),
+    h("div", { class: "row spans" }, buttons, h("span", { class: "row dates" }, from, h("span", { class: "hint" }, "to"), to), back),
     h("div", { class: "columns history" }, h("section", { class: "panel" }, plots), h("section", { class: "panel items" }, h("h2", {}, "Items"), search, h("ul", {}, boxes.map((one) => one.row)))));
 
   function sift() {
