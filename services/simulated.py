@@ -6,6 +6,7 @@ mosquitto, MariaDB and ROS where they are installed, else an embedded broker and
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import shutil
 from collections.abc import Collection, Iterator
@@ -22,6 +23,8 @@ from services.topics import CAMERA_STATUS
 
 CONFIG = Path(__file__).parents[1] / "config"
 USUAL_BROKER_PORT = 1883
+ROBOT = ("rospy", "actionlib", "move_base_msgs")  # what bridge and simulated robot need besides a master
+ROBOT_PACKAGES = "python3-rospy python3-actionlib python3-move-base-msgs"
 USUAL_DASHBOARD_PORT = 8088
 
 
@@ -151,10 +154,12 @@ def _start_database(stack: ExitStack, parts: Parts, real: bool) -> None:
 def _start_ros(stack: ExitStack, parts: Parts, real: bool) -> None:
     try:
         _only_if(real, "ROS")
+        if lacking := [name for name in ROBOT if importlib.util.find_spec(name) is None]:
+            raise Missing(f"Python finds no {', '.join(lacking)}: apt-get install {ROBOT_PACKAGES}")
         parts.ros = stack.enter_context(ros.private(parts.folder / "ros"))
     except Missing as missing:
         parts.environment["APARTMENT_WITHOUT_ROS"] = "true"
-        parts.note("robot", "no ROS, a bridge to nowhere", missing)
+        parts.note("robot", "on the bus, no ROS", missing)
     else:
         parts.environment.update(parts.ros.env)
         parts.note("robot", f"ROS 1, ROS_MASTER_URI={parts.ros.uri}")

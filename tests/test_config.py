@@ -76,6 +76,13 @@ def test_six_faults_of_six_kinds_are_all_told_with_file_and_line(folder: Path) -
     assert "items.Kitchen-Light: expected a name of letters, digits and _" in by_place[places[5]]
 
 
+def test_where_the_apartment_lies_is_not_said_to_the_bridge_any_more(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, "  rules: bridge.yaml", "  apartment: [1, 2, 3]\n  rules: bridge.yaml")
+    (told,) = faults(file)
+    assert told.startswith(f"{file}:{line}: bridge.apartment: expected places: FILE, whose apartment_to_map")
+
+
 def test_several_cameras_are_simulated_from_one_file_each_in_a_service_of_its_own(folder: Path) -> None:
     file = folder / "simulated.yaml"
     spoil(file, "simulators:\n", "simulators:\n  cameras:\n    hall: {port: 8942}\n    attic: {profile: 2020s-dahua}\n")

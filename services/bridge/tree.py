@@ -11,6 +11,7 @@ from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard
 from services.bus import Message
 from services.payloads import CameraStatus, Position, ScanResult, seconds
+from services.robot_places import Relation
 from services.vision.frames import Mount
 
 TF, TF_STATIC, JOINTS = "/tf", "/tf_static", "/joint_states"
@@ -19,14 +20,12 @@ SEEN = ("online", "degraded")  # states of a camera whose position is known
 
 
 class Tree(Part):
-    """`mounts` of the cameras, by name; `apartment`: x, y and yaw of its origin on the map. The first camera's joints
-    have the plain name."""
+    """`mounts` of the cameras, by name; `apartment`: where it lies in the map. The first camera's joints have the plain
+    name."""
 
     rows = (topics.CAMERA_POSITION, topics.CAMERA_MARKER, topics.CAMERA_STATUS)
 
-    def __init__(
-        self, cameras: tuple[str, ...], mounts: Mapping[str, Mount], apartment: tuple[float, float, float]
-    ) -> None:
+    def __init__(self, cameras: tuple[str, ...], mounts: Mapping[str, Mount], apartment: Relation) -> None:
         self._cameras, self._mounts, self._apartment = cameras, mounts, apartment
         self._joints = {cam: JOINTS if cam == cameras[0] else f"/{cam}{JOINTS}" for cam in cameras}
         outlets = [Outlet(TF, "tf2_msgs/TFMessage", queue=100), Outlet(TF_STATIC, "tf2_msgs/TFMessage", latch=True)]
@@ -72,7 +71,7 @@ class Tree(Part):
             node.publish(self._joints[cam], frames.joints(cam, where, now))
 
     def _fixed(self, now: float) -> list[Fields]:
-        x, y, yaw_deg = self._apartment
+        x, y, yaw_deg = self._apartment.x, self._apartment.y, self._apartment.yaw_deg
         cameras = [part for cam, mount in self._mounts.items() for part in frames.fixed(cam, mount, now)]
         markers = [found for seen in self._markers.values() if (found := frames.marker(seen)) is not None]
         return [frames.apartment_in_map(x, y, yaw_deg, now), *cameras, *markers]

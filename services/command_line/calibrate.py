@@ -20,8 +20,9 @@ from rich.table import Table
 from rich.text import Text
 
 from services import client, document
-from services.client import FINAL, Client
+from services.client import Client
 from services.command_line import prints
+from services.command_line.calibrate_map import map_
 from services.command_line.prints import Book, Inner, Kind, Side, Squares, squares_of
 from services.command_line.zoom import zoom
 from services.config import Apartment, load
@@ -41,6 +42,7 @@ ASK = "May {} turn now? It looks for the markers all around, for some minutes, a
 
 
 app.command(epilog="Example: apartment calibrate zoom ip1 --yes-move")(zoom)
+app.command("map", epilog="Example: apartment calibrate map --pair 0,0=1.5,-0.8 --pair 5.6,6=5.73,6.23")(map_)
 
 
 @app.command(epilog="Example: apartment calibrate ptz ip1 --yes-move")
@@ -181,7 +183,7 @@ def _ordered(
         if isinstance(result, Calibration):
             hear(result)
             return False
-        return result.id == mine and result.state in FINAL
+        return isinstance(result, OrderResult) and result.id == mine and result.final
 
     wanted = (CAMERA_CALIBRATION.name(cam=camera), CAMERA_ORDER_RESULT.name(cam=camera))
     end = bus.until(

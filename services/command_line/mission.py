@@ -68,23 +68,24 @@ def where(marker: int, robot: Robot = None, config: Config = CONFIG, json: Json 
 def _robot(config: Path, wanted: str | None) -> Iterator[tuple[Client, str]]:
     """The bus, and the robot that is meant."""
     apartment = load(config, ("mission",))
-    name = _robot_of(apartment, wanted)
+    name, _ = robot_of(apartment, wanted)
     with client.connected(apartment.bus, FILTERS) as bus:
         yield bus, name
 
 
-def _robot_of(apartment: Apartment, wanted: str | None) -> str:
-    """The robot that is meant: the one that was named, or the only one; ConfigError otherwise."""
+def robot_of(apartment: Apartment, wanted: str | None) -> tuple[str, Path]:
+    """The robot that is meant, and its file: the one that was named, or the only one; ConfigError otherwise."""
     from services.mission import Config as Missions  # for these commands alone
 
     mission = apartment.instances.get("mission")
-    robots = list(mission.config.robots) if mission is not None and isinstance(mission.config, Missions) else []
+    known = mission.config if mission is not None and isinstance(mission.config, Missions) else None
+    robots = {name: known.folder / one.places for name, one in known.robots.items()} if known else {}
     if wanted is None and len(robots) == 1:
-        return robots[0]
+        return next(iter(robots.items()))
     if wanted not in robots:
-        known = ", ".join(robots) or "none there"
-        raise ConfigError([f"{apartment.file}:1: mission.robots: expected one of {known}, got {wanted!r}"])
-    return wanted
+        names = ", ".join(robots) or "none there"
+        raise ConfigError([f"{apartment.file}:1: mission.robots: expected one of {names}, got {wanted!r}"])
+    return wanted, robots[wanted]
 
 
 def _found(bus: Client, robot: str, marker: int, timeout_s: float, tell: Tell) -> MissionResult:

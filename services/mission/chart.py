@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import atan2, degrees, hypot
 
 from services.floor import Grid
-from services.mission.standing import Pose, body, stands
+from services.mission.standing import ANY, Pose, View, body, stands
 from services.mission.state import HERE, ROUND, XYZ, Lead, Stand
 from services.robot_places import RobotPlaces
 
@@ -56,11 +56,13 @@ class Chart:
     def _poses(self, position: XYZ, normal: XYZ | None, robot: Pose) -> list[Pose]:
         if self.grid is None:
             return []
-        facing = None
+        facing, view = None, ANY
         if normal is not None and abs(normal[2]) < FLAT:
             facing = self.places.apartment_to_map.yaw_deg + _azimuth(normal)
+        elif normal is not None and self.places.eye > position[2]:
+            view = View.down(self.places.eye - position[2])
         who = body(self.grid, self.places.radius, (robot.x, robot.y))
-        return stands(self.grid, who, self.places.apartment_to_map.to_map(*position[:2]), facing)
+        return stands(self.grid, who, self.places.apartment_to_map.to_map(*position[:2]), facing, view)
 
     def _point(self, place: str, position: XYZ | None) -> str | None:
         """The point of the place's name, else the one nearest to the marker."""

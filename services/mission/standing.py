@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, degrees, hypot, pi, radians, sin
+from math import atan2, cos, degrees, hypot, inf, pi, radians, sin, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.floor import XY, Grid
 
-DISTANCES_M = (1.2, 0.9, 1.5, 1.9, 2.3)  # to the marker, the best first
+DISTANCES_M = (0.5, 0.7, 0.9, 1.2, 1.5, 1.9, 2.3)  # to the marker that are tried
+BEST_M, NEAREST_M = 1.2, 0.8  # as a rule; a print that lies high is looked at from nearer
 BEARINGS = 24  # directions round it that are tried
 APART_M = 0.6  # stands nearer to each other than this show the same
 OBLIQUE = radians(60)  # farther from the marker's face it is hard to read
+SLANT, STEEP = radians(50), radians(65)  # from above, to a print that lies: to be had at best, and at most
+TOO_FLAT = 3.0  # metres of distance that a stand beyond the latter costs
 WAY_COST = 0.15  # a metre of way more is worth so many metres of distance to the marker
 
 
@@ -40,13 +43,37 @@ def body(grid: Grid, radius: float, at: XY) -> Body:
     return Body(radius, at, grid.reachable(at, radius + grid.resolution / 2))
 
 
-def stands(grid: Grid, robot: Body, target: XY, facing_deg: float | None = None, most: int = 4) -> list[Pose]:
+@dataclass(frozen=True)
+class View:
+    """From how far something is best looked at, metres; farther than `farthest_m` it shows hardly anything."""
+
+    best_m: float = BEST_M
+    farthest_m: float = inf
+
+    @classmethod
+    def down(cls, above_m: float) -> View:
+        """On a print that lies so far below the robot's camera."""
+        return cls(above_m * tan(SLANT), above_m * tan(STEEP))
+
+    def cost(self, distance: float) -> float:
+        """What a distance is worse than the best, metres; infinite where it is nearer than anybody stands."""
+        if distance < min(NEAREST_M, self.best_m):
+            return inf
+        return abs(distance - self.best_m) + (TOO_FLAT if distance > self.farthest_m else 0.0)
+
+
+ANY = View()
+
+
+def stands(
+    grid: Grid, robot: Body, target: XY, facing_deg: float | None = None, view: View = ANY, most: int = 4
+) -> list[Pose]:
     """Poses from which the robot faces `target` (map frame, metres), best first, none when there are none.
 
     `facing_deg`: the direction in which the marker's print faces, where it hangs; None: it can be read from all sides.
     Each keeps the robot's radius to what is not free, can be driven to, and has no occupied cell in its line of sight.
     """
-    found = sorted(_possible(grid, robot, target, facing_deg), key=lambda one: one[0])
+    found = sorted(_possible(grid, robot, target, facing_deg, view), key=lambda one: one[0])
     chosen: list[Pose] = []
     for _, pose in found:
         if len(chosen) < most and all(hypot(pose.x - other.x, pose.y - other.y) >= APART_M for other in chosen):
@@ -54,15 +81,15 @@ def stands(grid: Grid, robot: Body, target: XY, facing_deg: float | None = None,
     return chosen
 
 
-def _possible(grid: Grid, robot: Body, target: XY, facing_deg: float | None) -> list[tuple[float, Pose]]:
+def _possible(grid: Grid, robot: Body, target: XY, facing_deg: float | None, view: View) -> list[tuple[float, Pose]]:
     possible = []
-    for distance in DISTANCES_M:
+    for distance in (one for one in DISTANCES_M if view.cost(one) < inf):
         for bearing in np.arange(BEARINGS) * 2 * pi / BEARINGS:
             aside = 0.0 if facing_deg is None else _between(bearing, radians(facing_deg))
             x, y = float(target[0] + distance * cos(bearing)), float(target[1] + distance * sin(bearing))
             if aside <= OBLIQUE and _may_stand(grid, robot, (x, y)) and grid.sees((x, y), target):
                 way = hypot(x - robot.at[0], y - robot.at[1])
-                cost = abs(distance - DISTANCES_M[0]) + WAY_COST * way + 0.5 * aside
+                cost = view.cost(distance) + WAY_COST * way + 0.5 * aside
                 possible.append((cost, Pose(x, y, degrees(atan2(target[1] - y, target[0] - x)))))
     return possible
 

@@ -18,7 +18,7 @@ from services.camera.program import eye
 from services.camera.scan.analysis import Inline
 from services.camera.service import CameraService
 from services.camera.web.gate import Gate
-from services.client import FINAL, Client
+from services.client import Client
 from services.config import Instance, load
 from services.payloads import OrderResult, PositionSet
 from services.runner import Post, Runner
@@ -98,7 +98,7 @@ class VirtualApartment(AbstractContextManager["VirtualApartment"]):
 
         def over() -> bool:
             answers = [read(message, self.now).payload for message in self.client.pump() if message.topic == answer]
-            ended.extend(one for one in answers if one.state in FINAL and one.key == key)
+            ended.extend(one for one in answers if one.final and one.key == key)
             return bool(ended)
 
         self.client.say(topic, payload)

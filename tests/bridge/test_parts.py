@@ -27,9 +27,11 @@ JPEG = b"\xff\xd8 a picture \xff\xd9"
 
 @pytest.fixture
 def bridge(tmp_path: Path) -> Iterator[Driven]:
+    places = tmp_path / "robot_places.yaml"
+    places.write_text("apartment_to_map: {x: 1.0, y: 2.0, yaw_deg: 90.0}\n", encoding="utf-8")
     config = {"home": ROOMS, "cameras": ("ip1", "ip2"), "folder": CONFIG, "state": tmp_path, "simulated": True,
               "camera_sections": {"ip1": {"mount": MOUNT, "brand": "amcrest"}, "ip2": {"mount": 3}},
-              "apartment": [1.0, 2.0, 90.0], "robot": "tiago"}  # fmt: skip
+              "places": places, "robot": "tiago"}  # fmt: skip
     posted: list[Any] = []
     with start(Config.model_validate(config), posted.append) as service:
         driven = Driven(service, posted)

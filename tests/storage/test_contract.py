@@ -8,7 +8,19 @@ from dataclasses import replace
 import pytest
 
 from services.errors import BadMessage
-from services.storage import Batch, CameraOrder, Diagnostic, Item, Sample, Scan, Sighting, Storage, open_storage
+from services.payloads import FINAL
+from services.storage import (
+    FINAL_STATES,
+    Batch,
+    CameraOrder,
+    Diagnostic,
+    Item,
+    Sample,
+    Scan,
+    Sighting,
+    Storage,
+    open_storage,
+)
 from tests.databases import Database
 
 T0 = 1_769_839_200_000_000  # 2026-01-31 06:00 UTC
@@ -125,6 +137,10 @@ def test_a_scan_follows_its_states_until_it_has_ended(storage: Storage, database
     assert rows == [("done", "582", 8)]
     seconds = {"sqlite": "(ended-started)/1000000", "mariadb": "TIMESTAMPDIFF(SECOND,started,ended)"}[database.kind]
     assert database.rows(f"SELECT {seconds} FROM scan") == [(60,)]
+
+
+def test_an_order_ends_in_the_states_in_which_it_ends_on_the_bus() -> None:
+    assert FINAL_STATES == FINAL
 
 
 def test_an_order_keeps_its_first_time_and_its_final_state(storage: Storage, database: Database) -> None:
