@@ -31,6 +31,7 @@ from services.peers import mosquitto
 from services.runner import Runner
 from tests.bridge import bench as bridge_bench
 from tests.camera import goal_figures, scan_figures
+from tests.dashboard import bench as dashboard_bench
 from tests.persistence import figures as writer_figures
 from tests.vision import bench as vision_bench
 
@@ -206,6 +207,12 @@ def vision_part(_: Path, __: int) -> Part:
     return vision_bench.table(rows), [asdict(row) for row in rows]
 
 
+def dashboard_part(folder: Path, _: int) -> Part:
+    """The dashboard."""
+    rows = list(dashboard_bench.rows(folder))
+    return dashboard_bench.table(rows), [asdict(row) for row in rows]
+
+
 PARTS: dict[str, Callable[[Path, int], Part]] = {
     "bus": bus_part,
     "persistence": stored_part,
@@ -213,6 +220,7 @@ PARTS: dict[str, Callable[[Path, int], Part]] = {
     "bridge": bridge_part,
     "scan": scan_part,
     "vision": vision_part,
+    "dashboard": dashboard_part,
 }
 
 
