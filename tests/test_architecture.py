@@ -120,6 +120,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.bridge.images",
         "services.floor",
         "services.mission.paper",
+        "services.dashboard.thumbnail",
         "services.simulators.camera.",
         "services.simulators.robot.eye",
     ),
