@@ -170,6 +170,7 @@ PURE = (
     "services.hubs.homeassistant", "services.hubs.homie",
     "services.dashboard.view", "services.mission.plan", "services.mission.state", "services.mission.events",
     "services.mission.moment", "services.mission.standing", "services.mission.memory", "services.mission.telling",
+    "services.mission.both", "services.mission.refresh",
     "services.simulators.agenda", "services.simulators.climate", "services.simulators.robot.route",
     "services.simulators.robot.plan", "services.simulators.robot.sight", "services.simulators.robot.body",
     "services.simulators.devices", "services.simulators.life",
