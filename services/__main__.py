@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import signal
 import sys
+from json import dumps
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,12 +18,12 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, topics
 from services.bus import Message
-from services.command_line import calibrate, mission, openhab, stored
+from services.command_line import backup, calibrate, dashboard, doctor, install, mission, openhab, secrets, stored
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
 from services.supervisor import Supervisor, commands, processes
-from services.topics import page
+from services.topics import asyncapi, page
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -80,7 +81,11 @@ def demo(
 @app.command(epilog="Example: apartment check --config config/apartment.yaml")
 def check(config: Config = CONFIG) -> None:
     """Check a configuration and every file that it names: lists every fault with file and line."""
+    from services.credentials import strength
+
     apartment = load(config, deep=True)
+    if weak := strength.faults(apartment):
+        raise ConfigError(weak)
     cameras = ", ".join(apartment.cameras) or "none"
     out.print(f"{config}: good. Services: {', '.join(apartment.instances)}. Cameras: {cameras}.")
 
@@ -90,6 +95,7 @@ def topics_(
     write: Annotated[Path | None, typer.Option(help="Write the table there.")] = None,
     acl: Annotated[Path | None, typer.Option(help="Write the broker's access list there.")] = None,
     passwords: Annotated[Path | None, typer.Option(help="Write the broker's password file there.")] = None,
+    as_asyncapi: Annotated[bool, typer.Option("--asyncapi", help="Show it as an AsyncAPI 3 document.")] = False,
     config: Config = CONFIG,
 ) -> None:
     """Show the table of topics, or write the files that come from it and from the accounts of the configuration."""
@@ -100,7 +106,9 @@ def topics_(
     if passwords is not None:
         accounts = load(config).bus.accounts
         access.write_passwords(passwords, {name: one.get_secret_value() for name, one in accounts.items() if one})
-    if write is acl is passwords is None:
+    if as_asyncapi:
+        _say(dumps(asyncapi.document(), indent=1))
+    elif write is acl is passwords is None:
         _say(page.markdown())
 
 
@@ -191,9 +199,15 @@ def probe(
 
 
 stored.add_to(app)
+app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
+app.command(epilog="Example: apartment restore apartment.zip")(backup.restore)
+app.command(epilog="Example: apartment doctor")(doctor.doctor)
+app.command(epilog="Example: apartment install --dry-run")(install.install)
 app.add_typer(calibrate.app, name="calibrate")
+app.add_typer(dashboard.app, name="dashboard")
 app.add_typer(mission.app, name="mission")
 app.add_typer(openhab.app, name="openhab")
+app.add_typer(secrets.app, name="secrets")
 
 
 def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:

@@ -8,12 +8,15 @@ from __future__ import annotations
 import base64
 import hashlib
 import os
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from services.registry import REGISTRY
 from services.topics import TABLE, Topic
 
+CONF = Path(__file__).parents[1] / "mosquitto" / "mosquitto.conf"
+TLS_CONF = CONF.with_name("tls.conf")
 PLAYS = {row.name: row.plays for row in REGISTRY if row.plays}
 ITERATIONS = 101  # of PBKDF2, as mosquitto_passwd of Debian 12 writes
 
@@ -55,12 +58,13 @@ def _add(rows: dict[str, str], account: str, topic: Topic, *, writes: bool, read
     """A service's own topics carry its name in the level `<service>` or `<cam>`."""
     camera = account.removeprefix("camera-") if account.startswith("camera-") else None
     if "<service>" in topic.writers:
-        rows[topic.filter_for(service=account)] = "readwrite"
+        rows[topic.filter_for(service=account)] = "write"
         if reads:
-            rows.setdefault(topic.filter, "read")
+            rows[topic.filter] = "read"
         return
     own = {"cam": camera} if camera and "cam" in topic.names else {}
-    rows[topic.filter_for(**own)] = "readwrite" if writes and reads else "write" if writes else "read"
+    right = "readwrite" if writes and reads else "write" if writes else "read"
+    rows.update(dict.fromkeys(topic.filters_for(**own), right))
 
 
 def _may(account: str, roles: tuple[str, ...]) -> bool:
@@ -84,7 +88,22 @@ def write_passwords(file: Path, passwords: Mapping[str, str]) -> None:
     write_private(file, "".join(f"{password_line(account, password)}\n" for account, password in passwords.items()))
 
 
-def write_private(file: Path, text: str) -> None:
-    """Writes a file with mode 0600 from its first byte on."""
-    with open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w", encoding="utf-8") as output:
-        output.write(text)
+def write_private(file: Path, text: str | bytes) -> None:
+    """Writes a file with mode 0600 from its first byte on; whoever reads meanwhile sees the old one or the new one."""
+    beside = file.with_name(f".{file.name}.{os.getpid()}")
+    beside.unlink(missing_ok=True)
+    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as output:
+        output.write(text.encode() if isinstance(text, str) else text)
+        output.flush()
+        os.fsync(output.fileno())
+    beside.replace(file)
+
+
+def broker_conf(folder: Path, data: Path | None = None, *, encrypted: bool = True) -> str:
+    """`mosquitto.conf` as the project has it, with its files in `folder` and its memory in `data` (else there too).
+
+    `encrypted`: with the listener for other machines, whose certificate and key stand in `folder`.
+    """
+    text = CONF.read_text(encoding="utf-8") + ("\n" + TLS_CONF.read_text(encoding="utf-8") if encrypted else "")
+    text = re.sub(r"(?m)^(password_file|acl_file|certfile|keyfile) ", rf"\1 {folder.absolute()}/", text)
+    return re.sub(r"(?m)^persistence_location .*", f"persistence_location {(data or folder).absolute()}/", text)

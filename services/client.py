@@ -19,8 +19,6 @@ from services.payloads import Order, OrderResult
 from services.process import address
 from services.topics import CAMERA_ORDER, CAMERA_ORDER_RESULT, read
 
-FINAL = ("done", "failed", "refused", "cancelled")
-
 
 class Client:
     """Waits on a bus from the caller's thread. What came while it waited for something else is kept in `seen`."""
@@ -103,7 +101,7 @@ class Client:
                 return False
             if tell is not None:
                 tell(result)
-            return result.state in FINAL
+            return result.final
 
         result: OrderResult = self.payload(CAMERA_ORDER_RESULT.name(cam=camera), ours, timeout_s)
         return result

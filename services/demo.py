@@ -116,7 +116,7 @@ def _order_scan(bus: Client, camera: str, advance: Callable[[ScanState], None]) 
             payload = topics.read(message, message.received).payload
             if isinstance(payload, ScanState):
                 advance(payload)
-            if isinstance(payload, OrderResult) and payload.id == order.id and payload.state in client.FINAL:
+            if isinstance(payload, OrderResult) and payload.id == order.id and payload.final:
                 return payload.error or payload.state
     return f"no answer within {SCAN_S:.0f} s"
 

@@ -18,6 +18,11 @@ import yaml
 from services.errors import ConfigError
 
 Path_ = tuple[str | int, ...]
+MOST = (
+    200_000  # values in a file; an alias (`*name`) counts as often as it is used, or a few lines could fill the memory
+)
+DEEPEST = 50  # lists in lists; also what ends one that contains itself
+LARGEST = 16 * 1024 * 1024  # bytes of a file
 REFERENCE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)(?::-([^}]*))?\}")
 
 
@@ -75,6 +80,9 @@ def read(file: Path, secret: Callable[[str], str | None] | None = None, *, names
     """
     document = Document(file)
     try:
+        if file.stat().st_size > LARGEST:
+            document.fault((), f"expected at most {LARGEST} bytes, got {file.stat().st_size}")
+            return document
         root = yaml.compose(file.read_text(encoding="utf-8"), Loader=_Loader)
     except (OSError, UnicodeDecodeError) as error:
         document.fault((), f"expected a readable file, got {getattr(error, 'strerror', None) or error}")
@@ -83,8 +91,15 @@ def read(file: Path, secret: Callable[[str], str | None] | None = None, *, names
         document.lines[()] = error.problem_mark.line + 1 if error.problem_mark else 1
         document.fault((), f"expected YAML, got {error.problem}")
         return document
+    except RecursionError:
+        document.fault((), f"expected lists and mappings {DEEPEST} deep at most, got more")
+        return document
+    reader = _Reader(document, secret, names=names)
     if root is not None:
-        document.value = _Reader(document, secret, names=names).value(root, ())
+        try:
+            document.value = reader.value(root, ())
+        except ConfigError as error:
+            document.faults += error.faults
     return document
 
 
@@ -114,9 +129,14 @@ class _Reader:
         self.secret = secret
         self.names = names
         self.scalars = _Loader("")
+        self.count = 0
 
     def value(self, node: yaml.Node, path: Path_) -> Any:
         self.document.lines.setdefault(path, node.start_mark.line + 1)
+        self.count += 1
+        if self.count > MOST or len(path) > DEEPEST:
+            wanted = f"{MOST} values" if self.count > MOST else f"lists and mappings {DEEPEST} deep"
+            raise ConfigError([f"{self.document.file}:{node.start_mark.line + 1}: file: expected {wanted} at most"])
         if isinstance(node, yaml.MappingNode):
             return self.mapping(node, path)
         if isinstance(node, yaml.SequenceNode):

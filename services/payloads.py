@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, RootModel, field_validator, model_validator
 
 OrderState = Literal["accepted", "running", "done", "failed", "refused", "cancelled"]
+FINAL: tuple[OrderState, ...] = ("done", "failed", "refused", "cancelled")  # an order has one of them once
 Who = Literal["human", "mission", "scan"]
 LARGEST = 1e300  # so that whoever takes a number may make a float of it
 
@@ -129,6 +130,11 @@ class OrderResult(Payload):
     error: str | None = None
     position: Position | None = None
     clamped: bool = False
+
+    @property
+    def final(self) -> bool:
+        """Whether this is the order's end."""
+        return self.state in FINAL
 
 
 class Place(Payload):

@@ -10,6 +10,7 @@ import importlib
 import json
 import logging
 import os
+import secrets
 import signal
 import ssl
 import sys
@@ -19,8 +20,10 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+from services.access import write_private
 from services.aside import Aside
 from services.bus import WAKE_TOPIC, Message
 from services.bus.connection import Address
@@ -58,6 +61,19 @@ def address(settings: BusSettings, client_id: str, account: str, **options: Any)
         keepalive_s=settings.keepalive_s,
         **options,
     )
+
+
+def client_id(settings: BusSettings, name: str, state: Path) -> str:
+    """Who a service is to the broker, in all its lives. Where it has an account, a name that nobody can guess:
+    mosquitto gives a session, and all that waits in it, to whoever comes by its name, whatever account he has.
+    """
+    if not settings.accounts.get(name):
+        return name
+    file = state / name / "client"
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_private(file, f"{name}-{secrets.token_hex(8)}")
+    return file.read_text(encoding="ascii")
 
 
 def tls_context(tls: Tls) -> ssl.SSLContext:
@@ -110,7 +126,13 @@ def _off_bus(instance: Instance, stopping: threading.Event, ready: OneReady) -> 
 def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event, ready: OneReady) -> None:
     row, name = instance.row, instance.name
     bus = MqttBus(
-        address(apartment.bus, name, name, protocol=row.protocol, durable=row.durable),
+        address(
+            apartment.bus,
+            client_id(apartment.bus, name, apartment.state),
+            name,
+            protocol=row.protocol,
+            durable=row.durable,
+        ),
         birth=SERVICE_STATUS.message("online", service=name),
         will=SERVICE_STATUS.message("offline", service=name),
     )

@@ -77,4 +77,5 @@ REGISTRY: tuple[Row, ...] = (
     Row("openhab", "services.openhab", ("openhab",), "mirrors an OpenHAB that has no MQTT binding", group="light"),
     Row("hubs", "services.hubs", ("hubs",), "tells Home Assistant and Homie what there is", group="light"),
     Row("mission", "services.mission", ("mission",), "robot and house find a marker together", group="light"),
+    Row("dashboard", "services.dashboard", ("dashboard",), "shows and steers everything in a browser"),
 )

@@ -11,13 +11,15 @@ from pathlib import Path
 
 from services import document
 
+SYSTEM = Path("/etc/apartment")
+
 
 def lookup(environment: Mapping[str, str] = os.environ) -> Callable[[str], str | None]:
     """A function from a name to its value, or None. The first of these that knows the name wins:
 
     1. the environment variable,
     2. the file of that name in `$CREDENTIALS_DIRECTORY` (systemd's LoadCredential),
-    3. `secrets.yaml`: `$APARTMENT_SECRETS`, else `/etc/apartment/secrets.yaml` or `~/.config/apartment/secrets.yaml`.
+    3. `secrets.yaml`: `$APARTMENT_SECRETS`, else in `~/.config/apartment` or `/etc/apartment` (or `secrets/` in there).
     """
     stored = _secrets_file(environment)
 
@@ -32,12 +34,20 @@ def lookup(environment: Mapping[str, str] = os.environ) -> Callable[[str], str |
     return find
 
 
+def home(environment: Mapping[str, str] = os.environ) -> Path:
+    """The folder of a new installation's secrets: root's is the machine's, everybody else has one of their own."""
+    return (SYSTEM if os.geteuid() == 0 else _own(environment)) / "secrets"
+
+
+def _own(environment: Mapping[str, str]) -> Path:
+    return Path(environment.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "apartment"
+
+
 def _secrets_file(environment: Mapping[str, str]) -> dict[str, str]:
-    home = Path(environment.get("XDG_CONFIG_HOME") or Path.home() / ".config")
     named = environment.get("APARTMENT_SECRETS")
-    files = [Path(named)] if named else [home / "apartment/secrets.yaml", Path("/etc/apartment/secrets.yaml")]
-    for file in files:
-        if file.is_file():
+    places = [place / name for place in (_own(environment), SYSTEM) for name in ("", "secrets")]
+    for file in [Path(named)] if named else [place / "secrets.yaml" for place in places]:
+        if os.access(file, os.R_OK):  # the machine's own are root's
             values = document.must(document.read(file))
             return {str(name): str(value) for name, value in (values or {}).items()}
     return {}

@@ -6,9 +6,10 @@ mosquitto, MariaDB and ROS where they are installed, else an embedded broker and
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import shutil
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,9 @@ from services.topics import CAMERA_STATUS
 
 CONFIG = Path(__file__).parents[1] / "config"
 USUAL_BROKER_PORT = 1883
+ROBOT = ("rospy", "actionlib", "move_base_msgs")  # what bridge and simulated robot need besides a master
+ROBOT_PACKAGES = "python3-rospy python3-actionlib python3-move-base-msgs"
+USUAL_DASHBOARD_PORT = 8088
 
 
 @dataclass
@@ -82,6 +86,8 @@ def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
     parts.environment["APARTMENT_CAMERA_PORT"] = str(free_port())
     parts.environment["APARTMENT_CAMERA_RTSP_PORT"] = str(free_port())
     parts.environment["APARTMENT_SIDE_DOOR_PORT"] = str(free_port())
+    taken = not real or answers(USUAL_DASHBOARD_PORT)
+    parts.environment["APARTMENT_DASHBOARD_PORT"] = "0" if taken else str(USUAL_DASHBOARD_PORT)
     with ExitStack() as stack:
         for start in (_start_broker, _start_database, _start_ros):
             start(stack, parts, real)
@@ -96,12 +102,22 @@ def _wait_for_cameras(apartment: Apartment, names: Collection[str]) -> None:
 
 
 @contextmanager
-def services_of(folder: Path, parts: Parts, without: Collection[str] = ()) -> Iterator[Simulated]:
-    """Starts the services, waits until they and the cameras answer, and ends them with the block."""
+def services_of(
+    folder: Path,
+    parts: Parts,
+    without: Collection[str] = (),
+    only: Collection[str] = (),
+    change: Callable[[Path], None] = lambda _: None,
+) -> Iterator[Simulated]:
+    """Starts the services, waits until they and the cameras answer, and ends them with the block.
+
+    `only`: these and no others. `change` is given the copy of the configuration before anything reads it.
+    """
     config = folder / "config" / "simulated.yaml"
     shutil.copytree(CONFIG, config.parent)  # saved places and the like are not to change the repository
+    change(config)
     apartment = load(config, environment={**os.environ, **parts.environment})
-    names = [name for name in apartment.instances if name not in without]
+    names = [name for name in apartment.instances if name not in without and (not only or name in only)]
     supervisor = Supervisor(commands(processes(apartment, names), config), parts.environment, folder / "services.log")
     with in_background(supervisor) as ready:
         _wait_for_cameras(apartment, names)
@@ -148,10 +164,12 @@ def _start_database(stack: ExitStack, parts: Parts, real: bool) -> None:
 def _start_ros(stack: ExitStack, parts: Parts, real: bool) -> None:
     try:
         _only_if(real, "ROS")
+        if lacking := [name for name in ROBOT if importlib.util.find_spec(name) is None]:
+            raise Missing(f"Python finds no {', '.join(lacking)}: apt-get install {ROBOT_PACKAGES}")
         parts.ros = stack.enter_context(ros.private(parts.folder / "ros"))
     except Missing as missing:
         parts.environment["APARTMENT_WITHOUT_ROS"] = "true"
-        parts.note("robot", "no ROS, a bridge to nowhere", missing)
+        parts.note("robot", "on the bus, no ROS", missing)
     else:
         parts.environment.update(parts.ros.env)
         parts.note("robot", f"ROS 1, ROS_MASTER_URI={parts.ros.uri}")

@@ -27,6 +27,7 @@ class Kind(Enum):
     BLOB = "blob"  # a picture, QoS 0
 
 
+CHOICES = {"trait": ("$name", "$datatype", "$settable", "$retained", "$format", "$unit")}  # of a property in Homie
 LEVELS = {
     "item": r"[A-Za-z_][A-Za-z0-9_]*",
     "cam": r"[a-z][a-z0-9_]*",
@@ -41,6 +42,7 @@ LEVELS = {
     "node": r"[a-z0-9][a-z0-9-]*",
     "property": r"[a-z0-9][a-z0-9-]*",
     "attribute": r"\$[a-z]+",
+    "trait": "|".join(map(re.escape, CHOICES["trait"])),
     "component": r"[A-Za-z0-9_-]+(?:/[A-Za-z0-9_-]+)*",
 }
 
@@ -90,6 +92,13 @@ class Topic:
             qos=0 if self.kind is Kind.BLOB else 1,
             expires_s=int(STALE_AFTER_S) if self.kind in (Kind.COMMAND, Kind.BLOB) else None,
         )
+
+    def filters_for(self, **levels: str) -> list[str]:
+        """The filters with some levels given, one for each choice where there are few: `+` would let in more."""
+        named = next((name for name in self.names if name in CHOICES), None)
+        if named is None:
+            return [self.filter_for(**levels)]
+        return [self.filter_for(**levels, **{named: choice}) for choice in CHOICES[named]]
 
     def filter_for(self, **levels: str) -> str:
         """The filter with some levels given: `camera/ip1/order/+`."""

@@ -31,6 +31,7 @@ from services.peers import mosquitto
 from services.runner import Runner
 from tests.bridge import bench as bridge_bench
 from tests.camera import goal_figures, scan_figures
+from tests.dashboard import bench as dashboard_bench
 from tests.mission import bench as mission_bench
 from tests.persistence import figures as writer_figures
 from tests.vision import bench as vision_bench
@@ -213,6 +214,12 @@ def mission_part(_: Path, __: int) -> Part:
     return mission_bench.table(figures), list(mission_bench.plain(figures))
 
 
+def dashboard_part(folder: Path, _: int) -> Part:
+    """The dashboard."""
+    rows = list(dashboard_bench.rows(folder))
+    return dashboard_bench.table(rows), [asdict(row) for row in rows]
+
+
 PARTS: dict[str, Callable[[Path, int], Part]] = {
     "bus": bus_part,
     "persistence": stored_part,
@@ -221,6 +228,7 @@ PARTS: dict[str, Callable[[Path, int], Part]] = {
     "scan": scan_part,
     "vision": vision_part,
     "mission": mission_part,
+    "dashboard": dashboard_part,
 }
 
 

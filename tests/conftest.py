@@ -15,7 +15,7 @@ from tests.databases import Database, fresh_mariadb, fresh_sqlite
 
 settings.register_profile("apartment", deadline=None)  # the machine may be busy with other things
 settings.load_profile("apartment")
-NEEDED = {"mosquitto", "mariadb", "ros", "rtsp", "chromium", "node"}
+NEEDED = {"mosquitto", "mariadb", "ros", "rtsp", "chromium", "node", "systemd"}
 
 
 @pytest.hookimpl(hookwrapper=True)

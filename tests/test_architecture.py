@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -33,6 +34,7 @@ CORE = (
 FILES_OF_OURS = ("services.document", "services.secret_store")  # reading YAML, finding secrets
 SHELL = ("services.config", "services.registry", "services.runner", "services.aside", "services.process")
 BUSES = ("services.bus.mqtt", "services.bus.memory", "services.bus.connection", "services.bus.outbox")
+ROS_GRAPH = ("services.ros_master", "services.ros_node")
 SERVICE = (*CORE, "services.runner", "services.document")  # they meet on the bus, never in an import
 LAYERS: dict[str, tuple[str, ...]] = {
     "services": (),
@@ -51,25 +53,38 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.bus.memory": (*CORE, "services.bus.outbox"),
     "services.bus.connection": CORE,
     "services.bus.outbox": CORE,
+    "services.ros_master": ("services.errors",),
+    "services.ros_node": ("services.errors", "services.ros_master"),
     "services.vision": ("services.errors",),
-    "services.storage": ("services.errors",),
+    "services.storage": ("services.errors", "services.section"),
     "services.document": ("services.errors",),
     "services.secret_store": ("services.errors", "services.document"),
     "services.registry": (),
     "services.access": (*CORE, "services.registry"),
+    "services.credentials": (*CORE, "services.access", "services.config", *FILES_OF_OURS),
     "services.aside": CORE,
     "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
     "services.runner": (*CORE, "services.aside"),
     "services.camera": (*SERVICE, "services.vision"),
-    "services.bridge": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
+    "services.bridge": (*SERVICE, *ROS_GRAPH, "services.vision", "services.floor", "services.robot_places"),
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage"),
     "services.openhab": SERVICE,
     "services.hubs": SERVICE,
     "services.mission": (*SERVICE, "services.floor", "services.robot_places"),
-    "services.dashboard": SERVICE,
-    "services.simulators": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
-    "services.process": (*CORE, *BUSES, *SHELL),
+    "services.dashboard": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
+    "services.simulators": (*SERVICE, *ROS_GRAPH, "services.vision", "services.floor", "services.robot_places"),
+    "services.process": (*CORE, *BUSES, *SHELL, "services.access"),
+    "services.doctor": ("services",),
+    "services.backup": (*CORE, *SHELL, "services.storage"),
+    "services.installation": (
+        *CORE,
+        *SHELL,
+        *FILES_OF_OURS,
+        "services.access",
+        "services.credentials",
+        "services.supervisor",
+    ),
     "services.supervisor": ("services.process", "services.config"),
     "services.client": (*CORE, *BUSES, *SHELL),
     "services.peers": (*CORE, "services.access"),
@@ -83,7 +98,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
 
 # One library, one door: where a library may be imported. A name alone is a module, one with a dot at its end all in it.
 EVERYWHERE = ("services", "services.")
-ROS = ("services.bridge.", "services.simulators.robot")
+ROS = ("services.ros_node", "services.bridge.", "services.simulators.robot.")
 DOORS: dict[str, tuple[str, ...]] = {
     "pydantic": EVERYWHERE,
     "pydantic_core": EVERYWHERE,
@@ -97,13 +112,17 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.camera.probe.",
         "services.openhab.rest",
         "services.openhab.live",
+        "services.dashboard.http.video",
     ),
     "cv2": (
         "services.vision.",
         "services.camera.video.",
         "services.bridge.images",
         "services.floor",
+        "services.mission.paper",
+        "services.dashboard.thumbnail",
         "services.simulators.camera.",
+        "services.simulators.robot.eye",
     ),
     "av": ("services.camera.video.rtsp",),
     "gi": ("services.simulators.camera.rtsp.",),
@@ -111,6 +130,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "sqlite3": ("services.storage.sqlite",),
     "croniter": ("services.persistence.cron",),
     "yaml": ("services.document",),
+    "cryptography": ("services.credentials.certificates",),
     "lark": ("services.openhab.check.",),
     "typer": ("services.__main__", "services.command_line."),
     "rich": (
@@ -120,10 +140,10 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.demo",
         "services.camera.probe.",
     ),
-    "starlette": ("services.dashboard.http",),
-    "uvicorn": ("services.dashboard.http",),
+    "starlette": ("services.dashboard.http.",),
+    "uvicorn": ("services.dashboard.http.server",),
     "pytest": ("services.pytest_plugin",),
-    **dict.fromkeys(("rospy", "rosgraph", "rosmaster", "genpy", "roslib", "actionlib", "tf2_ros"), ROS),
+    **dict.fromkeys(("rospy", "rosgraph", "rosmaster", "genpy", "genmsg", "roslib", "actionlib", "tf2_ros"), ROS),
     **dict.fromkeys(("std_msgs", "diagnostic_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs", "tf2_msgs"), ROS),
     **dict.fromkeys(("std_srvs", "actionlib_msgs", "move_base_msgs"), ROS),
 }
@@ -163,16 +183,19 @@ PURE = (
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
     "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules", "services.bridge.frames", "services.bridge.multipart",
-    "services.bridge.confirm", "services.bridge.pace", "services.bridge.items", "services.bridge.template",
+    "services.bridge.confirm", "services.bridge.pace", "services.bridge.robots.actions",
+    "services.bridge.robots.chain", "services.bridge.robots.goals", "services.bridge.items", "services.bridge.template",
     "services.persistence.rows", "services.persistence.seen", "services.persistence.strategies",
     "services.persistence.cron", "services.persistence.filters", "services.persistence.decisions",
     "services.history.answers", "services.history.plot", "services.storage.reading", *OPENHAB_PURE,
     "services.hubs.homeassistant", "services.hubs.homie",
-    "services.dashboard.view", "services.mission.plan", "services.mission.state", "services.mission.events",
+    "services.dashboard.view", "services.dashboard.sessions", "services.dashboard.chart", "services.dashboard.aim",
+    "services.mission.plan", "services.mission.state", "services.mission.events",
     "services.mission.moment", "services.mission.standing", "services.mission.memory", "services.mission.telling",
-    "services.mission.both", "services.mission.refresh",
+    "services.mission.both", "services.mission.refresh", "services.mission.timeline",
     "services.simulators.agenda", "services.simulators.climate", "services.simulators.robot.route",
     "services.simulators.robot.plan", "services.simulators.robot.sight", "services.simulators.robot.body",
+    "services.simulators.robot.navigation",
     "services.simulators.devices", "services.simulators.life",
 )  # fmt: skip
 IMPURE = (
@@ -436,3 +459,10 @@ def test_the_layers_say_what_the_style_sheet_says(module: str, other: str, allow
 def test_a_new_part_must_be_given_its_place() -> None:
     with pytest.raises(pytest.fail.Exception, match="add one that says what it may import"):
         row("services.utils")
+
+
+def test_a_process_loads_no_library_that_its_service_does_not_use() -> None:
+    heavy = ("cv2", "numpy", "lark", "httpx", "starlette", "uvicorn", "pymysql", "rospy")
+    code = f"import sys, services.__main__; print(*(one for one in {heavy} if one in sys.modules))"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    assert loaded == []

@@ -65,6 +65,7 @@ def test_run_is_ready_when_everything_answers_and_ends_cleanly(apart: tuple[Path
             "simulated-home+simulated-robot+persistence+bridge+mission",
             "history",
             "camera-ip1",
+            "dashboard",
         }
         with connected(BusSettings(port=ready["broker"]["port"]), ["service/+/status"]) as bus:
             for name in ("simulated-home", "persistence", "bridge", "camera-ip1"):

@@ -36,10 +36,11 @@ ILLEGAL = {
     "node": ["", "Lamp", "-a", "a_b", "a/b", "$a", "+"],
     "property": ["", "Value", "-a", "a_b", "a/b", "$a", "+"],
     "attribute": ["", "$", "name", "$Name", "$a/b", "+"],
+    "trait": ["", "$", "name", "$state", "$names", "x$name", "set", "+"],
 }
 
 
-SPECIAL = {"marker": "1", "attribute": "$name"}  # legal levels where `a` is none
+SPECIAL = {"marker": "1", "attribute": "$name", "trait": "$unit"}  # legal levels where `a` is none
 
 
 def legal(row: Topic) -> st.SearchStrategy[dict[str, str]]:

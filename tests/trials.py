@@ -158,6 +158,7 @@ def rubbish_topic(rng: random.Random) -> str:
         "marker": str(rng.randrange(2000)),
         "robot": rng.choice(["tiago", "nobody"]),
         "attribute": "$state",
+        "trait": "$name",
         **dict.fromkeys(("platform", "entity", "id", "device", "node", "property"), "x"),
     }
     return re.sub(r"<(\w+)>", lambda m: levels[m[1]], row.pattern) + rng.choice(["", "", "", "/more", "é"])

@@ -10,11 +10,10 @@ import logging
 import os
 import signal
 import threading
-from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
-from pathlib import Path
 
 from services.bridge import images, mapfile, viewer
+from services.bridge.hatch import Done, Told, Wanted
 from services.bridge.node import CALLED, Call, Outlet, Ports, Server
 from services.bridge.ros import RosNode
 from services.bridge.rules import Fields
@@ -26,35 +25,6 @@ LEAVE_S = 2.0  # saying goodbye to a master that may hang
 LOG_FORMAT = "%(asctime)s.%(msecs)03d %(levelname)-7s %(name)s: %(message)s"
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What the process is to do; `cameras`: prefix of the topics and file of the lens, by name."""
-
-    node: str
-    master_uri: str | None
-    cameras: dict[str, tuple[str, Path | None]] = field(default_factory=dict)
-    map: Path | None = None
-
-
-@dataclass(frozen=True)
-class Told:
-    """News of one camera for the process: where its stream is (empty: nowhere), and how far it is zoomed in."""
-
-    cam: str
-    url: str
-    zoom: float
-
-
-@dataclass(frozen=True)
-class Done:
-    """What the process says of itself: pictures shown and decoded so far, and how it stands with the master."""
-
-    shown: int
-    decoded: int
-    link: str
-    up: bool
 
 
 def run(wanted: Wanted, connection: Connection, every_s: float) -> None:

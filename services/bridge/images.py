@@ -8,6 +8,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from services.bridge.rules import Fields
 from services.errors import BadMessage
@@ -22,15 +23,21 @@ def one_thread() -> None:
     cv2.setNumThreads(1)
 
 
+def pixels(jpeg: bytes) -> NDArray[np.uint8]:
+    """BGR (h, w, 3) of a JPEG or PNG; BadMessage when the data make no picture."""
+    found = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if jpeg else None
+    if found is None:
+        raise BadMessage("expected a JPEG")
+    return np.asarray(found, np.uint8)
+
+
 def image(jpeg: bytes, header: Fields) -> Fields:
     """A sensor_msgs/Image, bgr8; BadMessage when the data make no picture."""
-    pixels = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if jpeg else None
-    if pixels is None:
-        raise BadMessage("expected a JPEG")
-    height, width = pixels.shape[:2]
+    decoded = pixels(jpeg)
+    height, width = decoded.shape[:2]
     return {
         "header": header, "height": height, "width": width, "encoding": "bgr8", "is_bigendian": 0, "step": 3 * width,
-        "data": pixels.tobytes(),
+        "data": decoded.tobytes(),
     }  # fmt: skip
 
 

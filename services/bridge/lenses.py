@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from math import inf
 
 from services import topics
+from services.bridge.hatch import BASE
 from services.bridge.node import Call, Node, Ports, Server
 from services.bridge.part import Part
 from services.bridge.rules import Heard
-from services.bridge.viewer import BASE
 from services.bus import Message
 from services.payloads import Order, OrderResult
 

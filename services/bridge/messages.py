@@ -16,6 +16,7 @@ from io import BytesIO
 from typing import Any
 
 from services import payloads, states
+from services.bridge import definitions
 from services.bridge.rules import Fields, Rule
 from services.bridge.template import Path, as_text, places
 from services.document import Path_
@@ -28,9 +29,13 @@ LENGTH = struct.Struct("<I")
 ARRAY = re.compile(r"(.+)\[(\d*)\]")
 
 
-@cache
 def message_class(name: str) -> MessageClass | None:
-    """The class of `diagnostic_msgs/KeyValue`; None when it is not installed."""
+    """The class of `diagnostic_msgs/KeyValue`; None when it is neither installed nor declared (`definitions.py`)."""
+    return _installed(name) or definitions.known(name)
+
+
+@cache
+def _installed(name: str) -> MessageClass | None:
     package, _, short = name.partition("/")
     try:
         return getattr(importlib.import_module(f"{package}.msg"), short, None)

@@ -16,26 +16,32 @@ from services.bridge.rules import Fields, Rule
 FROM_ROS = "/ros"  # before the ROS topic: `/ros/iot_command`
 CALLED = "/ros-call"  # before the name of the ROS service
 LINK = "/bridge/link"
+ANY = "*"  # type of an inlet: whatever its publisher says that it is, installed or not
 CALL_S = 30.0  # a call that we have not answered by then fails
 
 
 @dataclass(frozen=True)
 class Outlet:
-    """A topic that we publish. `latch`, `replay`: what is kept for who comes, the newest or that of every key."""
+    """A topic that we publish. `latch`, `replay`: what is kept for who comes, the newest or that of every key.
+
+    `definition`: the type's text, with those that it needs, where it need not be installed.
+    """
 
     topic: str
     type: str
     latch: bool = False
     replay: bool = False
     queue: int = 10  # per subscriber, in turns: all that a turn says is one entry
+    definition: str = ""
 
 
 @dataclass(frozen=True)
 class Inlet:
-    """A topic that we subscribe to."""
+    """A topic that we subscribe to. `newest`: of large messages that came together only the newest."""
 
     topic: str
     type: str
+    newest: bool = False
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,10 @@ class Part(Protocol):
         """Takes a call of one of its services."""
         return ()
 
+    def lost(self, now: float) -> None:
+        """The connection to the bus broke: nobody can be heard for a while."""
+        return None
+
     def tick(self, node: Node, now: float) -> Iterable[Message]:
         """Says what is to be said now."""
         return ()

@@ -1,93 +1,47 @@
-"""Puts the bridge together: its settings, the rules, the node, the parts. What it does is in `service.py`."""
+"""Puts the bridge together: the rules, the node, the parts. What it does is in `service.py`."""
 
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any
-
-from pydantic import Field, ValidationError, field_validator
 
 from services import __version__, robot_places
-from services.bridge import arguments, mapfile, messages, rulebook
+from services.bridge import arguments, mapfile, messages, robots, rulebook
 from services.bridge.confirm import Confirm
-from services.bridge.darkroom import Wanted
+from services.bridge.hatch import Wanted
 from services.bridge.items import Items
 from services.bridge.lenses import Lenses
 from services.bridge.missions import Missions
 from services.bridge.node import Outlet, Ports, ports
 from services.bridge.part import Part
 from services.bridge.pictures import Pictures
+from services.bridge.robots import Where
 from services.bridge.ros import RosNode
 from services.bridge.rules import Rule
 from services.bridge.service import Bridge
+from services.bridge.settings import Config
 from services.bridge.simulated import SimulatedNode
 from services.bridge.snapshots import Snapshots
 from services.bridge.tree import Tree
 from services.errors import ConfigError
-from services.home import Home
 from services.robot_places import Relation
 from services.runner import Post
-from services.section import Section
-from services.vision.frames import Mount
-
-
-class Hung(Section):
-    """How a camera hangs, as the bridge reads it from that camera's own section; faults in it are told there."""
-
-    model_config = {"extra": "ignore"}
-
-    mount: Mount | None = None
-    camera_info: Path | None = None
-
-
-class Config(Section):
-    """The bridge's section of the configuration."""
-
-    rules: str = "bridge.yaml"  # which topics are bridged, and how
-    node: str = Field(default="iot_bridge", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # its name in the ROS graph
-    master_uri: str | None = None  # http://host:11311; without it ROS_MASTER_URI of the environment
-    robot: str | None = None  # its name on the bus, for /iot_mission; None: no missions here
-    places: Path | None = None  # the robot's file: its map, shown on /map, and where the apartment lies in it
-    map: Path | None = None  # a map_server YAML to be shown instead; relative to the configuration
-    apartment: None = None  # until 0.1 the relation stood here, and a second time in the robot's file
-    simulated: bool = False  # a ROS node in memory, where there is no ROS
-    name: str = "bridge"
-    home: Home
-    cameras: tuple[str, ...] = ()
-    camera_sections: dict[str, Hung] = {}
-    folder: Path
-    state: Path | None = None
-
-    @field_validator("apartment", mode="before")
-    @classmethod
-    def stands_in_the_robots_file(cls, value: Any) -> None:
-        """Two files that say where the apartment lies would come to differ."""
-        if value is not None:
-            raise ValueError(f"expected places: FILE, whose apartment_to_map says it for all, got {value!r}")
-
-    @field_validator("camera_sections", mode="before")
-    @classmethod
-    def what_can_be_understood(cls, sections: Any) -> dict[str, Hung]:
-        """The rest is not ours: the password above all."""
-        found = {}
-        for cam, section in sections.items() if isinstance(sections, dict) else ():
-            with suppress(ValidationError):
-                found[str(cam)] = Hung.model_validate(section)
-        return found
 
 
 def check(config: Config) -> None:
     """ConfigError with every fault of the rules; their types are checked where ROS is installed."""
     known = _types(config) if importlib.util.find_spec("genpy") else rulebook.unchecked
     faults: list[str] = []
-    for load in (
+    loads: list[Callable[[], object]] = [
         lambda: rulebook.load(config.folder / config.rules, config.cameras, known),
         lambda: _relation(config),
         lambda: mapfile.load(shown) if (shown := _map(config)) else None,
-    ):
+        *(partial(robots.check, one, config.folder) for one in config.robots.values()),
+    ]
+    for load in loads:
         try:
             load()
         except ConfigError as error:
@@ -122,6 +76,9 @@ def _parts(config: Config) -> tuple[Part, ...]:
         parts.append(Lenses(config.cameras))
     if config.robot is not None:
         parts.append(Missions(config.robot))
+    if not config.simulated:  # without ROS the robot is on the bus itself
+        where = Where(arguments.name(config.node), config.master_uri, config.folder, config.state)
+        parts += [robots.part(name, one, where) for name, one in config.robots.items()]
     if not config.simulated and (config.cameras or _map(config)):
         parts.append(Pictures(_wanted(config)))
     return tuple(parts)

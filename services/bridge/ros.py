@@ -1,7 +1,8 @@
 """The node over rospy: topics made on a thread of their own, and registered again at every new ROS master.
 
-rospy's traps are met here, each where it bites: registration (`master.py`), Python's logging, the lock of a
-publisher's buffer, the queue of a new subscriber. Not here: what a message means (`rules.py`, `messages.py`).
+rospy's traps are met here, each where it bites: registration (`services/ros_master.py`), Python's logging
+(`services/ros_node.py`), the lock of a publisher's buffer, the queue of a new subscriber. Not here: what a message
+means (`rules.py`, `messages.py`).
 """
 
 from __future__ import annotations
@@ -12,26 +13,26 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from services.bridge import arguments, messages, reach
-from services.bridge.master import Master, Registrations, register, rival
-from services.bridge.node import CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Server
+from services import ros_node
+from services.bridge import arguments, definitions, messages, reach
+from services.bridge.node import ANY, CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Server
 from services.bridge.outgoing import Outgoing
 from services.bridge.rules import Fields
 from services.bridge.simtime import SimulatedTime
 from services.bus import Message
 from services.errors import ConfigError, Unavailable
+from services.ros_master import Master, register, rival
 from services.runner import Post
 
 POLL_S = 0.5  # of the master's pid; a new master knows us again within this time and some milliseconds
 LEAVE_S = 2.0  # saying goodbye to a master that hangs must not hold up our end
+LARGE = 2**24  # bytes; rospy drops older pictures only when they fit into its buffer together
 PACKAGES = (
     "python3-rospy python3-diagnostic-msgs python3-geometry-msgs python3-sensor-msgs python3-std-srvs "
-    "python3-tf2-msgs python3-nav-msgs"
+    "python3-tf2-msgs python3-nav-msgs python3-actionlib-msgs"
 )
 
 log = logging.getLogger(__name__)
@@ -54,7 +55,7 @@ class RosNode:
         self._master = Master(rosgraph.get_master_uri() or "http://localhost:11311", caller)
         self._ports = ports
         self._outlets = {outlet.topic: outlet for outlet in ports.outlets}
-        self._classes = {outlet.topic: messages.message_class(outlet.type) for outlet in ports.outlets}
+        self._classes = {outlet.topic: _class(outlet) for outlet in ports.outlets}
         ends = (
             OSError,
             ValueError,
@@ -122,9 +123,9 @@ class RosNode:
             self._end(f"it was shut down from outside; most often another node is named {self._master.caller}")
             return
         if pid == self._registered_with:
-            self._registrations_module().get_topic_manager().check_all()  # who has gone is noticed in writing only
+            ros_node.topic_manager().check_all()  # who has gone is noticed in writing only
             return
-        own = self._uri() if self._opened else ""
+        own = ros_node.uri() if self._opened else ""
         if other := rival(self._master, own):
             self._end(
                 f"another node is named {self._master.caller}, at {other}: name one of them otherwise (bridge.node)"
@@ -133,9 +134,9 @@ class RosNode:
         if not self._opened:
             self._open()
         self._clock.follow(self._master)
-        register(self._master, self._registrations())
+        register(self._master, ros_node.registrations(self._ports.parameters))
         self._registered_with = pid
-        count, advice = self._link.registrations + 1, reach.advice(self._uri(), self._master.uri)
+        count, advice = self._link.registrations + 1, reach.advice(ros_node.uri(), self._master.uri)
         self._tell(Link(up=True, text=f"{self._master.uri} pid {pid}", registrations=count, advice=advice))
 
     def _end(self, text: str) -> None:
@@ -149,10 +150,9 @@ class RosNode:
 
     def _open(self) -> None:
         """Makes the node and all its topics. Only `init_node` talks to the master, which has just answered."""
-        with _logging_kept():
-            self._rospy.init_node(self._name, disable_signals=True, disable_rosout=True, disable_rostime=True)
+        ros_node.begin(self._name)
         self._opened = True
-        self._registrations_module().get_registration_listeners().clear()
+        ros_node.forget_listeners()
         for outlet in self._ports.outlets:
             self._open_outlet(outlet)
         for inlet in self._ports.inlets:
@@ -169,8 +169,9 @@ class RosNode:
         publisher.impl.add_subscriber_listener(outgoing)
 
     def _open_inlet(self, inlet: Inlet) -> None:
-        kind = messages.message_class(inlet.type)
-        self._rospy.Subscriber(inlet.topic, kind, self._heard, callback_args=inlet.topic, tcp_nodelay=True)
+        kind = self._rospy.AnyMsg if inlet.type == ANY else messages.message_class(inlet.type)
+        large = {"queue_size": 1, "buff_size": LARGE} if inlet.newest else {}
+        self._rospy.Subscriber(inlet.topic, kind, self._heard, callback_args=inlet.topic, tcp_nodelay=True, **large)
 
     def _open_server(self, server: Server) -> None:
         kind: Any = messages.service_class(server.type)
@@ -178,6 +179,10 @@ class RosNode:
 
     def _heard(self, message: Any, topic: str) -> None:
         """On rospy's threads, one per publisher."""
+        if isinstance(message, self._rospy.AnyMsg):
+            message = definitions.decoded(message._buff, message._connection_header)
+        if message is None:
+            return
         self._post(Message(FROM_ROS + topic, value=messages.fields_of(message)))
 
     def _called(self, server: Server, response: Any, request: Any) -> Any:
@@ -192,46 +197,17 @@ class RosNode:
                 continue
         raise self._rospy.ServiceException("the bridge ends" if self._stopping.is_set() else "no answer in time")
 
-    def _uri(self) -> str:
-        return str(importlib.import_module("rospy.core").get_node_uri())
 
-    def _registrations_module(self) -> Any:
-        return importlib.import_module("rospy.impl.registration")
-
-    def _registrations(self) -> Registrations:
-        registration = self._registrations_module()
-        topics, services = registration.get_topic_manager(), registration.get_service_manager()
-        return Registrations(
-            self._uri(), topics.get_publications(), topics.get_subscriptions(), services.get_services(),
-            self._ports.parameters,
-        )  # fmt: skip
+def _class(outlet: Outlet) -> Any:
+    if outlet.definition and messages.message_class(outlet.type) is None:
+        return definitions.declare(outlet.type, outlet.definition)
+    return messages.message_class(outlet.type)
 
 
 def _rospy() -> Any:
-    """Its import puts its own logger class in Python's place, which loses the line of whoever logs.
-
-    Of what it tells itself, every connection for one, our log gets the warnings.
-    """
-    before = logging.getLoggerClass()
-    for name in ("rospy", "rosgraph"):
-        logging.getLogger(name).setLevel(logging.WARNING)
     try:
-        return importlib.import_module("rospy")
+        return ros_node.rospy()
     except ImportError as error:
         raise ConfigError(
             [f"bridge: expected ROS 1 ({error}): apt-get install {PACKAGES}, or simulated: true"]
         ) from error
-    finally:
-        logging.setLoggerClass(before)
-
-
-@contextmanager
-def _logging_kept() -> Iterator[None]:
-    """`init_node` takes our handlers from the root logger, and sets its level."""
-    root = logging.getLogger()
-    handlers, level = list(root.handlers), root.level
-    try:
-        yield
-    finally:
-        root.handlers[:] = handlers
-        root.setLevel(level)

@@ -18,7 +18,7 @@ from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Node
 from services.bridge.pace import Pace
 from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard, Rule, read, to_mqtt, to_ros
-from services.bus import Message, topic_matches
+from services.bus import LOST_TOPIC, Message, topic_matches
 from services.errors import ApartmentError, BadMessage
 from services.home import Home, Item
 from services.payloads import Diagnostic
@@ -52,6 +52,7 @@ class Bridge:
         self._slow_to_mqtt: Pace[Message] = Pace()
         rows = (topics.DIAGNOSTICS, *(row for part in parts for row in part.rows))
         self.subscribes = _apart([*(rule.filter for rule in self._to_ros), *(row.filter for row in rows)])
+        self.subscribes += (LOST_TOPIC,) if any(type(part).lost is not Part.lost for part in parts) else ()
         self._listening = {row: tuple(part for part in parts if row in part.rows) for row in rows}
         self._serving = {server.name: part for part in parts for server in part.ports.servers}
         self._hearing = {inlet.topic: part for part in parts for inlet in part.ports.inlets}
@@ -68,7 +69,10 @@ class Bridge:
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
         """See `Service`; a refused message from ROS is a BadMessage, and a warning in `diagnostics/bridge`."""
-        if message.value is None:
+        if message.topic == LOST_TOPIC:
+            for part in self.parts:
+                part.lost(now)
+        elif message.value is None:
             self._from_bus(message, now)
         elif message.topic == LINK and isinstance(message.value, Link):
             self._linked(message.value)

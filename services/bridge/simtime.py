@@ -10,8 +10,8 @@ import importlib
 import time
 from typing import Any
 
-from services.bridge.master import Master
 from services.errors import Unavailable
+from services.ros_master import Master
 
 PARAMETER = "/use_sim_time"
 TOPIC = "/clock"

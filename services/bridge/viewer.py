@@ -17,13 +17,13 @@ from urllib.parse import urlsplit
 
 from services import document
 from services.bridge import images
+from services.bridge.hatch import BASE
 from services.bridge.images import Intrinsics
 from services.bridge.multipart import Multipart, Shown
 from services.bridge.node import Node, Outlet
 from services.bridge.rules import Fields
 from services.errors import BadMessage, ConfigError
 
-BASE = "/ip_camera_rtsp"
 LOOK_S = 0.1  # between two looks whether somebody wants to see something
 RETRY_S = 1.0
 SILENT_S = 10.0  # a stream that brings nothing for so long is opened again

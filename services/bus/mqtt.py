@@ -218,6 +218,13 @@ class MqttBus:
         self._lost.wait()
         self._up = 0
         client.loop_stop()
+        self._let_go(client)
+
+    def _let_go(self, client: paho.Client) -> None:
+        """Its sockets are closed when nobody holds it any more; in a circle with us that would be left to chance."""
+        client.on_connect = client.on_disconnect = client.on_message = client.on_publish = None
+        if self._client is client:
+            self._client = None
 
     def _new_client(self) -> paho.Client:
         client = connection.client(self.address, self._protocol, self._will)

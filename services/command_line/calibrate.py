@@ -20,7 +20,7 @@ from rich.table import Table
 from rich.text import Text
 
 from services import client, document
-from services.client import FINAL, Client
+from services.client import Client
 from services.command_line import prints
 from services.command_line.calibrate_map import map_
 from services.command_line.prints import Book, Inner, Kind, Side, Squares, squares_of
@@ -183,7 +183,7 @@ def _ordered(
         if isinstance(result, Calibration):
             hear(result)
             return False
-        return result.id == mine and result.state in FINAL
+        return isinstance(result, OrderResult) and result.id == mine and result.final
 
     wanted = (CAMERA_CALIBRATION.name(cam=camera), CAMERA_ORDER_RESULT.name(cam=camera))
     end = bus.until(

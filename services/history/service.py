@@ -9,10 +9,9 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Self
 
-from pydantic import SecretStr, field_validator, model_validator
+from pydantic import model_validator
 
 from services import topics
 from services.bus import Message
@@ -22,8 +21,8 @@ from services.history.keeping import Keep
 from services.home import Home
 from services.payloads import HistoryGet, HistoryReply
 from services.runner import Post
-from services.section import Section
-from services.storage import Address, Storage, open_storage, read_address
+from services.storage import Storage, open_storage
+from services.storage.settings import DatabaseSection
 
 log = logging.getLogger(__name__)
 
@@ -34,30 +33,11 @@ PAUSE_S = 0.02  # between its pieces: the writer and questions come first
 SETTLE_S = 60.0  # after the database was opened
 
 
-class Config(Section):
-    """The section `history`; without one the service does not run."""
+class Config(DatabaseSection):
+    """The section `history`, with the database of the section persistence; without one the service does not run."""
 
-    url: str  # as in the section persistence: the same database
-    password: SecretStr | None = None
-    view_database: str = "OpenHAB"
     keep: tuple[Keep, ...] = ()  # how long; an item that no line names is kept for ever
     home: Home
-    folder: Path = Path()
-
-    @field_validator("url")
-    @classmethod
-    def is_an_address(cls, url: str) -> str:
-        try:
-            read_address(url)
-        except ConfigError as error:
-            raise ValueError("; ".join(fault.removeprefix("url: ") for fault in error.faults)) from error
-        return url
-
-    @property
-    def address(self) -> Address:
-        """Where the database is."""
-        password = self.password.get_secret_value() if self.password else None
-        return read_address(self.url, password=password, view_database=self.view_database, folder=self.folder)
 
     @model_validator(mode="after")
     def keeps_known_items(self) -> Self:

@@ -55,9 +55,7 @@ class Projection:
             for attribute, text in (("$name", item.label or name), ("$type", item.type), ("$properties", PROPERTY)):
                 yield topics.HOMIE_NODE.message(text, device=DEVICE, node=node, attribute=attribute)
             for attribute, text in _attributes(name, item):
-                yield topics.HOMIE_ATTRIBUTE.message(
-                    text, device=DEVICE, node=node, property=PROPERTY, attribute=attribute
-                )
+                yield topics.HOMIE_ATTRIBUTE.message(text, device=DEVICE, node=node, property=PROPERTY, trait=attribute)
         yield _device("$state", "ready")
 
     def state(self, name: str, text: str) -> Message | None:

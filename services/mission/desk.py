@@ -41,7 +41,6 @@ HEALTH_EVERY_S = 1.0
 SILENT_S = 10.0  # a robot that has said nothing for so long is away
 ASKED_AGAIN = 3  # times that a goal is sent until the robot takes it
 MOST_WAITING = 20
-FINAL = ("done", "failed", "refused", "cancelled")
 
 
 @dataclass(frozen=True)
@@ -148,11 +147,7 @@ class Desk:
     def scan_ended(self, camera: str, result: OrderResult, now: float) -> Iterator[Message]:
         """A camera answers one of our scans."""
         mission = self.mission
-        if (
-            mission is not None
-            and result.state in FINAL
-            and result.id == telling.scan_id(mission, camera, mission.scan)
-        ):
+        if mission is not None and result.final and result.id == telling.scan_id(mission, camera, mission.scan):
             reason = "" if result.state == "done" else f"the scan is {result.state}: {result.error or 'no reason'}"
             yield from self._happens(ScanEnded(camera, mission.scan, reason), now)
 

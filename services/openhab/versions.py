@@ -35,11 +35,6 @@ class Version:
         return self >= Version(5, 1)
 
     @property
-    def validator_refuses(self) -> bool:
-        """Whether a fault that is not of the grammar costs the whole file; before, it was only logged."""
-        return self >= Version(5, 1)
-
-    @property
     def free_sitemap(self) -> bool:
         """Whether a widget's keys are free in number and order, and their lists begin with a token of their own."""
         return self >= Version(5, 2)

@@ -14,7 +14,7 @@ from pathlib import Path
 from services import access
 from services.peers import answers, free_port, program, running
 
-CONF = Path(__file__).parents[2] / "mosquitto" / "mosquitto.conf"
+CONF = access.CONF
 
 
 @dataclass

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from pydantic import Field, SecretStr, field_validator
+from pydantic import Field
 
 from services import topics
 from services.bus import SESSION_TOPIC, Message
@@ -25,8 +25,8 @@ from services.persistence.decisions import Decisions
 from services.persistence.seen import Seen
 from services.persistence.strategies import Restore, Rule, Timetable
 from services.runner import Post
-from services.section import Section
-from services.storage import Address, Batch, Row, Storage, open_storage, read_address
+from services.storage import Batch, Row, Storage, open_storage
+from services.storage.settings import DatabaseSection
 
 log = logging.getLogger(__name__)
 
@@ -37,33 +37,14 @@ COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "resto
             "broker_dropped", "sessions_lost")  # fmt: skip
 
 
-class Config(Section):
+class Config(DatabaseSection):
     """The section `persistence`."""
 
-    url: str  # sqlite:///FILE, mysql://USER@HOST:PORT/DATABASE or mysql://USER@localhost/DATABASE?socket=PATH
-    password: SecretStr | None = None  # of the database's user
-    view_database: str = "OpenHAB"  # where the views with OpenHAB's layout go (MariaDB, MySQL)
     restore_after_s: float = Field(default=2.0, ge=0)  # how long the broker may take for its retained states
     broker_queue: int = Field(default=1_000_000, ge=1)  # the broker's max_queued_messages, as in mosquitto.conf
     name: str = "persistence"
     strategies: Path | None = None  # persistence.yaml; without it `persist` of each item in home.yaml says when
     home: Home
-    folder: Path = Path()
-
-    @field_validator("url")
-    @classmethod
-    def is_an_address(cls, url: str) -> str:
-        try:
-            read_address(url)
-        except ConfigError as error:
-            raise ValueError("; ".join(fault.removeprefix("url: ") for fault in error.faults)) from error
-        return url
-
-    @property
-    def address(self) -> Address:
-        """Where the database is."""
-        password = self.password.get_secret_value() if self.password else None
-        return read_address(self.url, password=password, view_database=self.view_database, folder=self.folder)
 
     @property
     def rules(self) -> dict[str, Rule]:

@@ -195,10 +195,6 @@ class World(Section):
                 return marker
         raise KeyError(marker_id)
 
-    def marker_pose(self, marker_id: int) -> Transform:
-        """`T_AM` of the marker with this id; KeyError when there is none."""
-        return self.marker(marker_id).pose
-
 
 def _one_of(known: Iterable[str], got: str) -> str:
     return f"expected one of {', '.join(known)}, got {got!r}"

@@ -191,9 +191,9 @@ def _from_samples(storage: Storage, item: Item, since: int, until: int, every_s:
     rows = storage.read(
         f"SELECT {group} b, COUNT(*), MIN(s.num), AVG(s.num), MAX(s.num) FROM sample s "
         f"WHERE s.item_id={item.item_id} AND s.num IS NOT NULL AND s.time>={sql.at(since)} AND s.time<{sql.at(until)} "
-        f"GROUP BY b ORDER BY b"
+        f"GROUP BY b ORDER BY NULL"  # else MariaDB sorts every sample, not every bucket: twice the time for a year
     )
-    return [_bucket(row) for row in rows]
+    return sorted((_bucket(row) for row in rows), key=lambda bucket: bucket.start)
 
 
 def _bucket(row: tuple[object, ...]) -> Bucket:

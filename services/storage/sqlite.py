@@ -168,7 +168,7 @@ class SqliteStorage:
 
     def quote(self, text: str) -> str:
         """See `Storage`."""
-        return "'" + text.replace("'", "''") + "'"
+        return "'" + text.replace("'", "''").replace("\0", "'||char(0)||'") + "'"
 
     def remake_views(self) -> None:
         """See `Storage`."""

@@ -27,6 +27,7 @@ from services.topics.mission import *
 
 TEXT_LIMIT = 256 * 1024
 BLOB_LIMIT = 4 * 1024 * 1024
+LONGEST_TOPIC = 1000  # bytes; MQTT has 65,535
 
 TABLE: tuple[Topic, ...] = tuple(
     row for rows in (home, camera, mission, history, discovery) for row in vars(rows).values() if isinstance(row, Topic)
@@ -106,7 +107,17 @@ def _first_fault(error: ValidationError) -> str:
 
 
 def reply(message: Message, to: Message) -> Message | None:
-    """The same answer for the one who asked by MQTT 5's response topic; None when nobody did."""
-    if not to.reply_to:
+    """The same answer for the one who asked by MQTT 5's response topic; None when nobody did.
+
+    None too where he wants it on a topic that he may not write himself perhaps: a state or command of the table, or no
+    topic that can be published to at all.
+    """
+    if not to.reply_to or not _takes_answers(to.reply_to):
         return None
     return message._replace(topic=to.reply_to, retain=False, correlation=to.correlation)
+
+
+def _takes_answers(topic: str) -> bool:
+    if topic[0] in "$/" or any(sign in topic for sign in "+#\0") or len(topic.encode()) > LONGEST_TOPIC:
+        return False
+    return not any(row.regex.fullmatch(topic) for row in TABLE if row.kind is not Kind.EVENT)

@@ -43,7 +43,7 @@ HOMIE_NODE = Topic(
     "homie/<device>/<node>/<attribute>", Kind.STATE, str, ("hubs",), ("openhab", "operator"), "Homie 4.0: an item"
 )
 HOMIE_ATTRIBUTE = Topic(
-    "homie/<device>/<node>/<property>/<attribute>",
+    "homie/<device>/<node>/<property>/<trait>",
     Kind.STATE,
     str,
     ("hubs",),

@@ -39,11 +39,6 @@ class Still:
     frames: tuple[int, ...]
     corners: Array
 
-    @property
-    def scatter_px(self) -> float:
-        """Standard deviation of a corner's coordinate from frame to frame; 0 of a single frame."""
-        return float(self.corners.std(axis=0, ddof=1).mean()) if len(self.frames) > 1 else 0.0
-
 
 def detect_still(frames: Sequence[Picture], dictionary: str, targets: Collection[int] | None = None) -> list[Still]:
     """What `detect` finds in the mean of these grey frames (h, w), at least one and all of one size; best first."""

@@ -125,17 +125,6 @@ def measure(wide: Picture, zoomed: Picture, between: tuple[float, float] = (1.0,
     return _checked(sure, sigma, width, height)
 
 
-def by_marker(wide: Array, zoomed: Array, noise_px: tuple[float, float], width: int, height: int) -> Magnification:
-    """The same from the corners (n, 2) of markers in both pictures, which have `width` x `height` pixels.
-
-    `noise_px`: standard deviation of a corner in the one and the other. ValueError when no zoom explains them.
-    """
-    similar, _, weights = _similarity(np.asarray(wide, float), np.asarray(zoomed, float), np.inf)
-    noise = hypot(noise_px[0] * _times(similar), noise_px[1])
-    sigma = noise / (_spread(np.asarray(zoomed, float), weights) * sqrt(len(wide)))
-    return _checked(similar, sigma, width, height)
-
-
 def _checked(similar: Array, scatter: float, width: int, height: int) -> Magnification:
     """The similarity as a magnification, unsure by such a share; ValueError when no zoom does that."""
     times = _times(similar)

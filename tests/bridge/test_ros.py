@@ -39,9 +39,17 @@ def pub(master: ros.Master, topic: str, kind: str, value: str) -> None:
 
 
 def publishers(master: ros.Master, topic: str) -> list[str]:
+    return _nodes(master, topic, 0)
+
+
+def subscribers(master: ros.Master, topic: str) -> list[str]:
+    return _nodes(master, topic, 1)
+
+
+def _nodes(master: ros.Master, topic: str, side: int) -> list[str]:
     with xmlrpc.client.ServerProxy(master.uri) as proxy:
         state: Any = proxy.getSystemState("/test")
-    return next((nodes for name, nodes in state[2][0] if name == topic), [])
+    return next((nodes for name, nodes in state[2][side] if name == topic), [])
 
 
 def test_a_new_subscriber_gets_every_state_and_then_what_happens(master: ros.Master, run_bridge: Run) -> None:

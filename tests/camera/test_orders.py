@@ -19,7 +19,7 @@ from jinja2 import Environment
 
 from services import peers
 from services.camera import orders
-from services.client import FINAL, Client
+from services.client import Client
 from services.payloads import OrderResult
 from tests.camera.trials import apart
 from tests.small_flat import Door, SmallFlat, small_flat
@@ -69,7 +69,7 @@ class Here:
 
         def ended(result: OrderResult) -> bool:
             answers.extend([result] if (result.key, result.value) == (key, wanted) else [])
-            return bool(answers) and answers[-1].state in FINAL
+            return bool(answers) and answers[-1].final
 
         self.bus.payload("camera/ip1/order_result", ended, limit_s)
         return answers
@@ -335,7 +335,7 @@ def a_file(here: Here) -> None:
 
 
 def is_played(here: Here) -> None:
-    played = httpx.get(f"{here.door.url}/played").json()
+    played = httpx.get(f"{here.door.url}/played", timeout=30).json()
     assert played[-1]["seconds"] == pytest.approx(0.5, abs=0.05)
 
 

@@ -8,7 +8,9 @@ from dataclasses import replace
 import pytest
 
 from services.errors import BadMessage
+from services.payloads import FINAL
 from services.storage import (
+    FINAL_STATES,
     Batch,
     CameraOrder,
     Diagnostic,
@@ -138,6 +140,10 @@ def test_a_scan_follows_its_states_until_it_has_ended(storage: Storage, database
     assert rows == [("done", "582", 8)]
     seconds = {"sqlite": "(ended-started)/1000000", "mariadb": "TIMESTAMPDIFF(SECOND,started,ended)"}[database.kind]
     assert database.rows(f"SELECT {seconds} FROM scan") == [(60,)]
+
+
+def test_an_order_ends_in_the_states_in_which_it_ends_on_the_bus() -> None:
+    assert FINAL_STATES == FINAL
 
 
 def test_a_mission_follows_its_states_until_it_has_ended(storage: Storage) -> None:

@@ -12,7 +12,7 @@ from services.simulators.camera.view.optics import window
 from services.simulators.camera.view.scene import Scene
 from services.simulators.world import load
 from services.vision.lens import Lens
-from services.vision.zoom import Level, Magnification, at_level, by_marker, measure
+from services.vision.zoom import Level, Magnification, at_level, measure
 
 WORLD = load(Path(__file__).parents[2] / "config/world.yaml")
 CAMERA = WORLD.cameras["ip1"]
@@ -76,16 +76,6 @@ def test_pictures_of_two_places_and_of_nothing_are_refused(scene: Scene) -> None
 def test_pictures_of_two_shapes_are_refused() -> None:
     with pytest.raises(ValueError, match="another shape"):
         measure(np.zeros((480, 640), np.uint8), np.zeros((360, 640), np.uint8))
-
-
-def test_a_marker_in_both_pictures_gives_the_magnification_too() -> None:
-    rng = np.random.default_rng(1)
-    square = np.array([[-20.0, -20], [20, -22], [21, 20], [-20, 19]])
-    middle, aside = np.array([575.5, 323.5]), np.array([200.0, 100.0])
-    wide, zoomed = middle + aside + square, middle + 1.8 * (aside + square)
-    found = by_marker(wide + rng.normal(0, 0.03, (4, 2)), zoomed + rng.normal(0, 0.03, (4, 2)), (0.03, 0.03), *SIZE)
-    assert abs(found.times - 1.8) < 3 * found.sigma
-    assert 0.0005 < found.relative < 0.004
 
 
 def test_the_lens_of_a_zoomed_picture_sends_every_ray_to_the_enlarged_pixel() -> None:

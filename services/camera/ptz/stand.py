@@ -18,6 +18,7 @@ REFUSALS = 3
 GRACE_S = 1.0  # a timed move ends so much later than our stop, which is to end it
 LEAST_SHARE = 4  # of 100: less is ignored
 TIMED = "Continuously"
+LEAST_PAUSE_S, LONGEST_PAUSE_S = 0.05, 0.3  # between two tries of a stop
 LOCKED_PAUSE_S = 60.0  # a camera that takes no login takes no stop either, and each try may lock the account
 
 
@@ -44,7 +45,7 @@ def stop(now: float, *, every: bool = False) -> Plan[Reply]:
 
     A camera that refuses stops (some do when nothing runs) is looked at instead: standing still is a confirmation.
     """
-    pause, refusals = 0.1, 0
+    pause, refusals = 2 * LEAST_PAUSE_S, 0
     while True:
         reply = yield from attempt(Stop(every=every))
         if reply.error is None:
@@ -52,9 +53,11 @@ def stop(now: float, *, every: bool = False) -> Plan[Reply]:
         refusals += isinstance(reply.error, Refused)
         if refusals >= REFUSALS and (yield from _stands()):
             return reply
-        locked = isinstance(reply.error, BadLogin | Locked)
-        yield from wait(reply.received + (LOCKED_PAUSE_S if locked else pause))
-        pause = min(2 * pause, 0.25)  # the stop is to arrive within 1 s of the network's return
+        if isinstance(reply.error, BadLogin | Locked):
+            yield from wait(reply.received + LOCKED_PAUSE_S)
+        else:  # the stop is to arrive within 1 s of the network's return: time spent knocking in vain is pause enough
+            yield from wait(max(reply.received + LEAST_PAUSE_S, reply.sent + pause))
+        pause = min(2 * pause, LONGEST_PAUSE_S)
 
 
 def _stands() -> Plan[bool]:

@@ -9,7 +9,7 @@ from services.camera.requests import Away
 from services.camera.web.digest import Login
 
 COMMAND = httpx.Timeout(6.0, connect=2.0)
-STOP = httpx.Timeout(6.0, connect=0.6)  # a lost knock is repeated by the kernel after 1 s only; we knock sooner
+STOP = httpx.Timeout(6.0, connect=0.45)  # a lost knock is repeated by the kernel after 1 s only; we knock sooner
 SNAPSHOT = httpx.Timeout(20.0, connect=2.0)
 
 

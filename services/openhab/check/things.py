@@ -6,7 +6,6 @@ The MQTT binding is known in detail, of others only that a UID is one. Not here:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from lark import Token
 
@@ -106,9 +105,3 @@ def _address_faults(one: ThingLine | ChannelLine) -> Iterator[str]:
 def full(thing: ThingLine, channel: ChannelLine) -> str:
     """A channel's UID."""
     return f"{thing.uid}:{channel.id}"
-
-
-def without_places(thing: ThingLine) -> ThingLine:
-    """The same without lines and columns: for comparing."""
-    channels = tuple(replace(one, line=0, column=0) for one in thing.channels)
-    return replace(thing, line=0, column=0, channels=channels)

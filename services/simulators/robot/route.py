@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from itertools import pairwise, product
+from itertools import product
 from math import hypot
 
 import numpy as np
@@ -84,8 +84,3 @@ def _open(grid: Grid, one: XY, other: XY, radius: float) -> bool:
         if not grid.inside(*cell) or grid.clearance[cell] < radius:
             return False
     return True
-
-
-def length(points: list[XY]) -> float:
-    """Metres."""
-    return sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(points))

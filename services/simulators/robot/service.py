@@ -7,7 +7,7 @@ as ROS nodes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from random import Random
 
@@ -16,13 +16,15 @@ from pydantic import Field
 
 from services import robot_places, topics
 from services.bus import Message
+from services.errors import ConfigError
 from services.payloads import Point, stamp
 from services.robot_payloads import GotoResult, RobotCancel, RobotGoto, RobotPose, RobotSeen, SeenMarker
-from services.runner import Post
+from services.runner import Post, Service
 from services.section import Section
 from services.simulators.camera.view.solids import boxes
 from services.simulators.robot import plan
 from services.simulators.robot.body import Body
+from services.simulators.robot.navigation import Navigation
 from services.simulators.robot.route import route
 from services.simulators.robot.sight import seen
 from services.simulators.world import World, load
@@ -42,12 +44,41 @@ class Config(Section):
     places: Path | None = None  # the file of its named points
     seed: int = 1
     fails: int = Field(default=0, ge=0)  # so many goals fail first, as when somebody stands in the way
+    on_bus: bool = True  # false: real ROS nodes (`nodes.py`), and the bridge speaks for them
+    fps: float = Field(default=4.0, gt=0, le=30)  # of the camera of those
 
 
 @contextmanager
-def start(config: Config, post: Post) -> Iterator[SimulatedRobot]:
-    """The service; it holds nothing that has to be closed."""
-    yield SimulatedRobot(config, load(config.folder / config.world))
+def start(config: Config, post: Post) -> Iterator[Service]:
+    """The service; ConfigError where it is to be ROS nodes and ROS is not installed."""
+    robot = SimulatedRobot(config, load(config.folder / config.world))
+    if config.on_bus:
+        yield robot
+        return
+    from services.simulators.robot import nodes  # ROS and pictures, for a robot on ROS alone
+
+    if not nodes.installed():
+        raise ConfigError(
+            ["simulators.robot: expected ROS 1: apt-get install python3-actionlib python3-move-base-msgs"]
+        )
+    navigation = Navigation(robot.grid, robot.places.radius, robot.body, config.fails, config.seed)
+    with closing(nodes.Nodes(robot.world, navigation, config.seed, config.fps)):
+        yield OffBus()
+
+
+class OffBus:
+    """The service of a robot that is ROS nodes: the bus hears nothing of it but that it runs."""
+
+    subscribes: tuple[str, ...] = ()
+    due: float | None = None
+
+    def handle(self, message: Message, now: float) -> Iterable[Message]:
+        """See `Service`."""
+        return ()
+
+    def tick(self, now: float) -> Iterable[Message]:
+        """See `Service`."""
+        return ()
 
 
 def check(config: Config) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from services.camera.scan.search import Scan
-from services.client import FINAL
+from services.payloads import FINAL
 from tests.camera.scan.virtual_scan import Seer, VirtualScan, virtual_scan
 
 PLACES = ["Sofa", "TV", "Kitchen", "Dining"]

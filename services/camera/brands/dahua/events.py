@@ -104,7 +104,7 @@ def read_event(body: bytes, *, whole: bool) -> Event | None:
 def _is_json(text: str) -> bool:
     try:
         json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return False
     return True
 

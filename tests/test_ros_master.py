@@ -13,9 +13,9 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 import pytest
 
 from services.bridge import master as master_module
-from services.bridge.master import Master, Registrations, register
 from services.errors import Unavailable
 from services.peers import free_port
+from services.ros_master import Master, Registrations, register
 
 
 @contextmanager

@@ -1,0 +1,57 @@
+"""`apartment install`: puts the apartment on this machine as services of systemd.
+
+Not here: the work itself, `services/installation/`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from services.errors import ConfigError
+
+CONFIG = Path("config/apartment.yaml")
+PLACEHOLDER = "not yet known"  # for a secret that the check of a new configuration would miss
+out = Console(soft_wrap=True, highlight=False)
+
+
+def install(
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only show what would be done.")] = False,
+    systemd: Annotated[bool, typer.Option("--systemd", help="Do it.")] = False,
+    host: Annotated[list[str] | None, typer.Option(help="A name of this machine, for its certificates.")] = None,
+    root: Annotated[Path, typer.Option(help="Write below this folder instead, and run nothing.")] = Path("/"),
+    config: Annotated[Path, typer.Option("--config", help="The configuration file.")] = CONFIG,
+) -> None:
+    """Install as services of systemd: units, users, folders, passwords, certificates, the broker's files."""
+    from services.command_line.secrets import own_hosts
+    from services.config import load
+    from services.credentials import passwords
+    from services.installation import steps
+    from services.installation.layout import SYSTEM
+
+    if dry_run == systemd:
+        raise ConfigError(["install: expected one of --dry-run and --systemd"])
+    there = root / SYSTEM.relative_to("/") / config.name
+    file = there if there.is_file() else config
+    unknown = {name: PLACEHOLDER for names in passwords.names(file) for name in names}
+    apartment = load(file, None, {**os.environ, **unknown})
+    plan = [] if there.is_file() else list(steps.copied(config.parent))
+    plan += steps.files(apartment, Path(sys.executable))
+    plan += [steps.ACCOUNTS]
+    if systemd:
+        for step in plan:
+            steps.do(step, root)
+        for told in steps.secrets(there, [*(host or []), *own_hosts()], root):
+            steps.do(told, root) if isinstance(told, steps.Step) else out.print(told, markup=False)
+        plan += steps.commands()
+        for step in steps.commands():
+            steps.do(step, root)
+    for step in plan if systemd else [*plan, *steps.commands()]:
+        out.print(str(step), markup=False)
+    for line in steps.next_words():
+        out.print(line, markup=False)

@@ -1,0 +1,81 @@
+"""The section `dashboard` of the configuration: where the page is, who may open it, what its plan shows."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, SecretStr, ValidationError, field_validator
+
+from services.dashboard import passwords
+from services.home import Home
+from services.section import Section
+
+Role = Literal["viewer", "operator"]
+
+
+class User(Section):
+    """Somebody who may log in. `apartment dashboard user NAME` makes the line; a viewer changes nothing."""
+
+    password: SecretStr  # hashed
+    role: Role = "viewer"
+
+    @field_validator("password")
+    @classmethod
+    def is_hashed(cls, text: SecretStr) -> SecretStr:
+        if not passwords.is_hash(text.get_secret_value()):
+            raise ValueError("expected a hash as `apartment dashboard user NAME` makes it")
+        return text
+
+
+class Tls(Section):
+    """The certificate that the page is served with."""
+
+    cert: Path
+    key: Path
+
+
+class RobotSettings(Section):
+    """One robot on the plan: the file of its points and its map."""
+
+    places: Path
+
+
+class Hung(Section):
+    """How a camera hangs, as its own section says; faults in it are told there."""
+
+    model_config = {"extra": "ignore"}
+
+    mount: dict[str, Any] | None = None
+    camera_info: Path | None = None
+    targets: tuple[int, ...] = ()
+
+
+class Config(Section):
+    """`name`, `home`, `cameras`, `camera_sections`, `folder` and `state` are given by the program."""
+
+    host: str = "127.0.0.1"  # 0.0.0.0 or :: for phones and other machines
+    port: int = Field(default=8088, ge=0, le=65535)  # 0: any that is free
+    tls: Tls | None = None
+    users: dict[str, User] = {}  # none: this machine alone may open it, without a login
+    names: tuple[str, ...] = ()  # by which the page is opened, besides addresses and this machine's own name
+    idle_h: float = Field(default=12.0, gt=0, le=720)  # a session that nobody used for so long has ended
+    plan: Path | None = None  # rooms and where things stand in them, for the plan
+    robots: dict[str, RobotSettings] = {}
+    name: str = "dashboard"
+    home: Home
+    cameras: tuple[str, ...] = ()
+    camera_sections: dict[str, Hung] = {}
+    folder: Path = Path()
+    state: Path | None = None
+
+    @field_validator("camera_sections", mode="before")
+    @classmethod
+    def what_can_be_understood(cls, sections: Any) -> dict[str, Hung]:
+        """The rest is not ours: the password above all."""
+        found = {}
+        for cam, section in sections.items() if isinstance(sections, dict) else ():
+            with suppress(ValidationError):
+                found[str(cam)] = Hung.model_validate(section)
+        return found

@@ -1,0 +1,149 @@
+"""What `apartment install` does, one step after the other; the same list is shown by `--dry-run`.
+
+Below another `root` than `/` everything is written and nothing is run: for an image of a machine, and for tests.
+"""
+
+from __future__ import annotations
+
+import os
+import pwd
+import shutil
+import subprocess
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from services import access
+from services.config import Apartment
+from services.credentials.folder import Folder, fill
+from services.errors import ApartmentError, ConfigError
+from services.installation import units
+from services.installation.layout import BROKER, DATABASE, GROUP, STATE, SYSTEM, TARGET, UNITS, parts
+
+SECRETS = SYSTEM / "secrets"
+BROKER_FILES = ("passwords", "acl", "server.crt", "server.key")
+HIDDEN = ("/home/", "/root/", "/run/user/")  # what ProtectHome hides from the services
+
+
+class NotDone(ApartmentError):
+    """A command of the installation failed; the message has its words."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A file to write, or a command to run. `owner` where it is not root's."""
+
+    path: Path | None = None
+    text: str | bytes = field(default="", repr=False)
+    mode: int = 0o644
+    owner: str = ""
+    command: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        if self.path is None:
+            return f"run    {' '.join(self.command)}"
+        return f"write  {self.path}{f' for {self.owner}' if self.owner else ''} ({self.mode:04o})"
+
+
+def copied(source: Path) -> Iterator[Step]:
+    """The configuration's own files, for a machine that has none."""
+    for file in sorted(source.rglob("*")):
+        if file.is_file():
+            yield Step(SYSTEM / file.relative_to(source), file.read_bytes())
+
+
+def files(apartment: Apartment, python: Path) -> list[Step]:
+    """systemd's units, users and folders."""
+    inside = next((place for place in HIDDEN if str(python).startswith(place)), None)
+    if inside is not None:
+        raise ConfigError([f"{python}: expected the program outside of {inside}, as in /opt/apartment: see docs/"])
+    found, config = parts(apartment), SYSTEM / apartment.file.name
+    texts = {part.unit: units.service(part, python, config, SECRETS) for part in found}
+    texts |= {TARGET: units.target(found), **units.renewal(python, SECRETS)}
+    texts |= {"mosquitto.service.d/apartment.conf": units.broker()}
+    return [
+        *(Step(UNITS / name, text) for name, text in texts.items()),
+        Step(Path("/etc/sysusers.d/apartment.conf"), units.users(found)),
+        Step(Path("/etc/tmpfiles.d/apartment.conf"), units.folders(found)),
+    ]
+
+
+ACCOUNTS = Step(command=("systemd-sysusers",))  # before files are given to them
+
+
+def commands() -> list[Step]:
+    """What makes systemd know them."""
+    wanted = (
+        ("systemd-tmpfiles", "--create", "apartment.conf"),
+        ("systemctl", "daemon-reload"),
+        ("systemctl", "enable", TARGET, "apartment-renew.timer"),
+        ("systemctl", "restart", "mosquitto.service"),
+    )
+    return [Step(command=command) for command in wanted]
+
+
+def secrets(config: Path, hosts: Sequence[str], root: Path) -> Iterator[Step | str]:
+    """Passwords and certificates where there are none; then the broker's part of them, for its own user."""
+    folder = Folder(root / SECRETS.relative_to("/"))
+    yield from fill(folder, config, hosts, datetime.now(UTC))
+    for name in BROKER_FILES:
+        text = (folder.path / "broker" / name).read_text(encoding="utf-8")
+        yield Step(BROKER / name, text, 0o600, "mosquitto")
+    yield Step(BROKER / "mosquitto.conf", access.broker_conf(BROKER, Path("/var/lib/mosquitto")), 0o600, "mosquitto")
+    if root != Path("/") or _is_user("mysql"):
+        yield from _database(folder)
+    yield Step(SYSTEM / "ca.crt", folder.authority.read_text(encoding="ascii"))
+    if (dashboard := folder.pair("dashboard")) is not None:
+        yield Step(SYSTEM / "dashboard.crt", dashboard.certificate)
+        yield Step(SYSTEM / "dashboard.key", dashboard.key, 0o640, f":{GROUP}")
+
+
+def _database(folder: Folder) -> Iterator[Step]:
+    for name in ("server.crt", "server.key"):
+        yield Step(DATABASE / name, (folder.path / "database" / name).read_text(encoding="ascii"), 0o600, "mysql")
+    yield Step(Path("/etc/mysql/mariadb.conf.d/60-apartment.cnf"), units.database())
+
+
+def _is_user(name: str) -> bool:
+    return any(one.pw_name == name for one in pwd.getpwall())
+
+
+def do(step: Step, root: Path) -> None:
+    """Writes or runs; NotDone when a command fails. What a command would do to this machine is left out elsewhere."""
+    if step.path is None:
+        if root == Path("/"):
+            _run(step.command)
+        return
+    file = root / step.path.relative_to("/")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if step.path.parent in (BROKER, DATABASE):
+        file.parent.chmod(0o700)
+    access.write_private(file, step.text)
+    if step.owner and root == Path("/") and os.geteuid() == 0:
+        user, _, group = step.owner.partition(":")
+        if user and not _is_user(user):
+            raise NotDone(f"no user {user}: apt-get install {user}")
+        for path in (file.parent, file) if user else (file,):
+            if user:
+                shutil.chown(path, user)
+            if group:
+                shutil.chown(path, group=group)
+    file.chmod(step.mode)
+
+
+def _run(command: Sequence[str]) -> None:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    except FileNotFoundError as error:
+        raise NotDone(f"{command[0]} is not installed: this machine has no systemd") from error
+    if done.returncode:
+        raise NotDone(f"{' '.join(command)}: {done.stderr.strip() or done.returncode}")
+
+
+def next_words() -> Iterator[str]:
+    """What is left for people."""
+    yield "Then:  apartment secrets set CAMERA_IP1_PASSWORD   (each camera's, as in docs/camera-account.md)"
+    yield f"       apartment db init --config {SYSTEM / 'apartment.yaml'}"
+    yield f"       systemctl start {TARGET}"
+    yield f"Watch: journalctl -f -u 'apartment-*'; what is kept is in {STATE}"

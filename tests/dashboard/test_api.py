@@ -1,0 +1,322 @@
+"""The HTTP API against a real broker: who may what, orders that reach the bus, what foreign pages cannot do."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import httpx
+import pytest
+from openapi_spec_validator import validate
+
+from services import peers, topics
+from services.dashboard.sessions import FREE_TRIES
+from services.payloads import HistoryReply, seconds
+from tests.dashboard.parts import PASSWORD, USERS, Running, running
+
+pytestmark = pytest.mark.mosquitto
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    """A dashboard with users."""
+    try:
+        with running(tmp_path_factory.mktemp("guarded"), users=USERS, names=("flat.example",)) as made:
+            yield made
+    except peers.Missing as missing:
+        pytest.skip(str(missing))
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    """A dashboard without users."""
+    try:
+        with running(tmp_path_factory.mktemp("opened")) as made:
+            yield made
+    except peers.Missing as missing:
+        pytest.skip(str(missing))
+
+
+PRIVATE = [
+    "/api/apartment", "/api/states", "/api/live", "/api/history/Kitchen_Temp", "/api/cameras/ip1/stream.mjpg",
+    "/api/cameras/ip1/snapshot.jpg", "/api/cameras/ip1/places", "/api/robots/tiago/map.png",
+]  # fmt: skip
+ORDERS = {
+    "/api/items/Kitchen_Light/command": {"value": "ON"},
+    "/api/items/Kitchen_Light/state": {"value": "ON"},
+    "/api/cameras/ip1/orders/Goto": {"value": "Kitchen"},
+    "/api/cameras/ip1/position": {"pan": 10},
+    "/api/cameras/ip1/centre": {"right": 0.5, "down": 0.5},
+    "/api/cameras/ip1/snapshot": {},
+    "/api/missions/tiago/find": {"find": 582},
+    "/api/missions/tiago/cancel": {},
+    "/api/missions/tiago/where": {"find": 582},
+    "/api/publish": {"topic": "home/Kitchen_Light/command", "payload": "ON"},
+}
+
+
+@pytest.mark.parametrize("path", PRIVATE)
+def test_who_is_not_logged_in_sees_nothing(guarded: Running, path: str) -> None:
+    with guarded.browser() as stranger:
+        assert stranger.get(path).status_code == 401
+
+
+@pytest.mark.parametrize("path", ORDERS)
+def test_who_is_not_logged_in_or_only_looks_orders_nothing(guarded: Running, path: str) -> None:
+    with guarded.browser() as stranger, guarded.browser("vic") as viewer:
+        assert stranger.post(path, ORDERS[path]).status_code == 401
+        assert viewer.post(path, ORDERS[path]).status_code == 403
+
+
+def test_every_order_of_the_api_is_tried_here(guarded: Running) -> None:
+    with guarded.browser() as anybody:
+        paths = anybody.get("/api/openapi.json").json()["paths"]
+    known = {path for path, methods in paths.items() if "post" in methods} - {"/api/login", "/api/logout"}
+    names = {"Kitchen_Light": "{item}", "ip1": "{camera}", "Goto": "{key}", "tiago": "{robot}"}
+    assert known == {"/".join(names.get(part, part) for part in path.split("/")) for path in ORDERS}
+
+
+def test_the_api_is_described_as_openapi_wants(guarded: Running) -> None:
+    with guarded.browser() as anybody:
+        validate(anybody.get("/api/openapi.json").json())
+
+
+def test_a_login_makes_a_new_session_that_no_script_can_read(guarded: Running) -> None:
+    with guarded.browser() as person:
+        person.http.cookies.set("apartment", "planted-by-somebody", domain="127.0.0.1")
+        cookie = person.login("ann").headers["set-cookie"]
+        assert "planted" not in cookie
+        for word in ("HttpOnly", "SameSite=strict", "Path=/"):
+            assert word in cookie
+        first = person.http.cookies["apartment"]
+        assert person.get("/api/session").json()["role"] == "operator"
+        person.login("ann")
+        assert person.http.cookies["apartment"] != first
+        with httpx.Client(base_url=guarded.url, cookies={"apartment": first}, trust_env=False, timeout=30) as old:
+            assert old.get("/api/apartment").status_code == 401
+
+
+def test_logging_out_ends_the_session(guarded: Running) -> None:
+    with guarded.browser("ann") as person:
+        token = person.http.cookies["apartment"]
+        assert person.post("/api/logout").status_code == 200
+        with httpx.Client(base_url=guarded.url, cookies={"apartment": token}, trust_env=False, timeout=30) as again:
+            assert again.get("/api/apartment").status_code == 401
+
+
+def test_a_wrong_login_is_refused_in_the_same_words_and_who_goes_on_is_slowed_down(guarded: Running) -> None:
+    """A dashboard of its own: tries are counted by address, too, and all tests come from one."""
+    folder = Path(guarded.folder, "guessed")
+    with running(folder, users=USERS) as made, made.browser() as person:
+        guesses = [("ann", "wrong"), ("nobody", PASSWORD), ("", "")]
+        assert len(guesses) == FREE_TRIES
+        answers = [person.login(*guess) for guess in guesses]
+        assert [answer.status_code for answer in answers] == [401] * FREE_TRIES
+        assert len({answer.text for answer in answers}) == 1
+        assert not any("set-cookie" in answer.headers for answer in answers)
+        answer = person.login("ann")  # even the right one
+        assert answer.status_code == 429
+        assert int(answer.headers["retry-after"]) >= 1
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [{"X-CSRF-Token": ""}, {"X-CSRF-Token": "guessed"}, {"Origin": "http://evil.example"}, {"Origin": "null"},
+     {"Sec-Fetch-Site": "cross-site"}, {"Sec-Fetch-Site": "same-site"}],
+)  # fmt: skip
+def test_a_foreign_page_orders_nothing(guarded: Running, headers: dict[str, str]) -> None:
+    with guarded.browser("ann") as person:
+        path = "/api/items/Kitchen_Light/command"
+        assert person.post(path, {"value": "ON"}, **headers).status_code == 403
+        own = {"Origin": guarded.url, "Sec-Fetch-Site": "same-origin"}
+        assert person.post(path, {"value": "ON"}, **own).status_code == 202
+
+
+def test_a_form_cannot_log_in(guarded: Running) -> None:
+    with guarded.browser() as person:
+        data = {"user": "ann", "password": PASSWORD}
+        assert person.http.post("/api/login", data=data).status_code == 422
+        assert person.http.post("/api/login", json=data, headers={"Origin": "http://evil.example"}).status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("host", "known"),
+    [("127.0.0.1:1", True), ("localhost", True), ("[::1]:8088", True), ("192.0.2.7:8088", True), ("FLAT.example", True),
+     ("evil.example", False), ("evil.example:8088", False), ("", False), ("127.0.0.1.evil.example", False)],
+)  # fmt: skip
+def test_only_our_own_names_are_answered(guarded: Running, host: str, known: bool) -> None:
+    answer = httpx.get(f"{guarded.url}/api/session", headers={"Host": host}, trust_env=False, timeout=30)
+    assert answer.status_code == (200 if known else 403)
+
+
+@pytest.mark.parametrize("path", ["/", "/main.js", "/api/session", "/nothing", "/../settings.py", "/api/live"])
+def test_every_answer_carries_the_strict_headers(guarded: Running, path: str) -> None:
+    headers = httpx.get(f"{guarded.url}{path}", trust_env=False, timeout=30).headers
+    policy = headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert "unsafe" not in policy
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["referrer-policy"] == "no-referrer"
+    assert "server" not in headers
+
+
+@pytest.mark.parametrize("path", ["/../settings.py", "/%2e%2e/settings.py", "/views/../../service.py", "/vendor"])
+def test_nothing_but_the_page_is_served(guarded: Running, path: str) -> None:
+    with guarded.browser() as person:
+        assert person.get(path).status_code == 404
+
+
+def test_without_users_this_machine_is_the_operator_and_nobody_comes_by_a_proxy(opened: Running) -> None:
+    with opened.browser() as person:
+        assert person.get("/api/session").json()["role"] == "operator"
+        assert person.get("/api/session", headers={"X-Forwarded-For": "192.0.2.1"}).status_code == 403
+        assert person.get("/api/session", headers={"Host": "192.0.2.7"}).status_code == 403
+
+
+SAID = {
+    "/api/items/Kitchen_Light/command": ("home/Kitchen_Light/command", "ON"),
+    "/api/items/Kitchen_Light/state": ("home/Kitchen_Light/set", "ON"),
+    "/api/cameras/ip1/orders/Goto": ("camera/ip1/order/Goto", {"value": "Kitchen", "by": "human"}),
+    "/api/cameras/ip1/position": ("camera/ip1/position/set", {"pan": 10.0, "tilt": None, "zoom": None}),
+    "/api/cameras/ip1/snapshot": ("camera/ip1/snapshot/get", ""),
+    "/api/missions/tiago/find": ("mission/tiago/order", {"find": 582, "cancel": False}),
+    "/api/missions/tiago/cancel": ("mission/tiago/order", {"find": None, "cancel": True}),
+    "/api/missions/tiago/where": ("mission/tiago/where", {"marker": 582}),
+    "/api/publish": ("home/Kitchen_Light/command", "ON"),
+}
+
+
+@pytest.mark.parametrize("path", SAID)
+def test_an_order_is_a_message_on_the_bus(guarded: Running, path: str) -> None:
+    topic, wanted = SAID[path]
+    guarded.bus.forget()
+    with guarded.browser("ann") as person:
+        answer = person.post(path, ORDERS[path])
+    assert answer.status_code == 202
+    message = guarded.bus.until(lambda message: message.topic == topic, 20.0, topic)
+    assert not message.retain
+    if isinstance(wanted, str):
+        assert message.payload.decode() == wanted
+    else:
+        payload = json.loads(message.payload)
+        assert {key: payload[key] for key in wanted} == wanted
+        assert payload["id"] == answer.json()["id"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "why"),
+    [
+        ("/api/items/Nothing/command", {"value": "ON"}, "no item"),
+        ("/api/items/Kitchen_Light/command", {"value": 5}, "string"),
+        ("/api/items/Kitchen_Light/command", {"value": "ON", "more": 1}, "more"),
+        ("/api/cameras/ip2/orders/Goto", {"value": "Kitchen"}, "expected one of ip1"),
+        ("/api/cameras/ip1/position", {}, "at least one"),
+        ("/api/missions/r2d2/find", {"find": 1}, "expected one of tiago"),
+        ("/api/missions/tiago/find", {"find": -1}, "greater"),
+        ("/api/publish", {"topic": "service/mission/status", "payload": "offline"}, "may not say"),
+    ],
+)
+def test_an_order_that_is_wrong_is_told_why(guarded: Running, path: str, body: object, why: str) -> None:
+    with guarded.browser("ann") as person:
+        answer = person.post(path, body)
+    assert answer.status_code == 422
+    assert why in answer.json()["error"]
+
+
+def test_a_body_that_nobody_needs_is_refused(guarded: Running) -> None:
+    with guarded.browser("ann") as person:
+        assert person.post("/api/publish", {"topic": "x", "payload": "x" * 70_000}).status_code == 413
+
+
+def test_states_and_places_can_be_asked_for(guarded: Running) -> None:
+    guarded.bus.say("home/Kitchen_Temp/state", "21.5 °C", retain=True)
+    guarded.bus.say("camera/ip1/places", '{"Sofa": {"pan": 1.0, "tilt": 2.0, "zoom": 0.0, "preset": 2}}', retain=True)
+    with guarded.browser("vic") as person:
+        peers.wait_until(lambda: person.get("/api/cameras/ip1/places").status_code == 200, "the places")
+        assert person.get("/api/cameras/ip1/places").json()["Sofa"]["tilt"] == 2.0
+        found = person.get("/api/states", params={"topics": "home/+/state"}).json()
+        assert found["home/Kitchen_Temp/state"] == "21.5 °C"
+        assert person.get("/api/states", params={"topics": "home/<x>"}).status_code == 422
+
+
+def test_a_page_hears_of_a_change_within_a_moment(guarded: Running) -> None:
+    with (
+        guarded.browser("vic") as person,
+        person.http.stream("GET", "/api/live", params={"topics": "home/Bedroom_Temp/state"}) as answer,
+    ):
+        lines = answer.iter_lines()
+        assert next(lines) == "event: snapshot"
+        begin = time.time()
+        guarded.bus.say("home/Bedroom_Temp/state", "19.5 °C", retain=True)
+        data = next(line for line in lines if line.startswith("data: [[") and "19.5" in line)
+        heard_ms = json.loads(data[6:])[0][2]
+    assert abs(heard_ms / 1000 - begin) < 15.0
+
+
+def answered(guarded: Running, path: str, **replies: dict[str, object]) -> httpx.Response:
+    """The answer to a question that the history service is played for; `replies` by what is asked."""
+    guarded.bus.forget()
+    with guarded.browser("vic") as person, ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(person.get, path)
+        told: set[str] = set()
+        while len(told) < len(replies):
+            asked = guarded.bus.payload("history/get", lambda one: one.id not in told, 20.0)
+            told.add(asked.id)
+            reply = HistoryReply(id=asked.id, item=asked.item, samples=[]).model_copy(update=replies[asked.what])
+            guarded.bus.publish(topics.HISTORY_REPLY.message(reply, id=asked.id))
+        return waiting.result(30.0)
+
+
+BUCKETS = {"unit": "°C", "buckets": [("2026-01-31T07:05:00Z", 3, 20.0, 20.5, 21.0)]}
+
+
+def test_what_was_of_a_number_comes_in_as_many_points_as_a_plot_has(guarded: Running) -> None:
+    path = "/api/history/Kitchen_Temp?since=2026-01-31T00:00:00Z&until=2026-02-01T00:00:00Z&points=100"
+    series = answered(guarded, path, samples=BUCKETS).json()
+    assert series["every"] == 900  # the least round width that gives no more than 100
+    assert series["unit"] == "°C"
+    assert series["rows"] == [[seconds("2026-01-31T07:05:00Z"), 20.0, 20.5, 21.0]]
+
+
+def test_what_was_of_a_state_begins_with_what_it_was_before(guarded: Running) -> None:
+    path = "/api/history/Kitchen_Light?since=2026-01-31T00:00:00Z&until=2026-02-01T00:00:00Z"
+    series = answered(
+        guarded, path, changes={"samples": [("2026-01-31T07:05:00Z", "ON")]},
+        last={"samples": [("2026-01-29T07:05:00Z", "OFF")]},
+    ).json()  # fmt: skip
+    since = seconds("2026-01-31T00:00:00Z")
+    assert series["rows"] == [[since, "OFF"], [seconds("2026-01-31T07:05:00Z"), "ON"]]
+
+
+def test_a_table_holds_nothing_that_a_spreadsheet_would_run(guarded: Running) -> None:
+    samples = {"samples": [("2026-01-31T07:05:00Z", '=HYPERLINK("x")')]}
+    path = "/api/history/Bedroom_Mode.csv?since=2026-01-31T00:00:00Z&until=2026-02-01T00:00:00Z"
+    table = answered(guarded, path, changes=samples, last={}).text
+    assert table == 'time,state\r\n2026-01-31T07:05:00.000Z,"\'=HYPERLINK(""x"")"\r\n'
+
+
+@pytest.mark.parametrize(
+    "query", ["since=yesterday", "since=2026-02-01T00:00:00Z&until=2026-01-01T00:00:00Z", "points=0", "points=9999999"]
+)
+def test_a_span_that_is_none_is_told(guarded: Running, query: str) -> None:
+    with guarded.browser("vic") as person:
+        assert person.get(f"/api/history/Kitchen_Temp?{query}").status_code == 422
+        assert person.get("/api/history/Nothing").status_code == 422
+
+
+def test_a_robots_map_is_a_picture(guarded: Running) -> None:
+    with guarded.browser("vic") as person:
+        answer = person.get("/api/robots/tiago/map.png")
+    assert answer.headers["content-type"] == "image/png"
+    assert answer.content.startswith(b"\x89PNG")
+
+
+def test_the_page_is_small() -> None:
+    """Everything together, as it travels: under 300 kB."""
+    from services.dashboard.http.files import Files
+
+    assert sum(len(file.packed) for file in Files()._files.values()) < 300_000
