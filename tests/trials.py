@@ -106,7 +106,7 @@ def restart_broker(flat: Simulated, how: signal.Signals) -> float:
     start_mosquitto(parts)
     back = time.monotonic()
     peers.wait_until(
-        lambda: all(f" as {name} (" in log.read_text()[old:] for name in BUS_SERVICES), "all services", 10.0
+        lambda: all(f" as {name}-" in log.read_text()[old:] for name in BUS_SERVICES), "all services", 10.0
     )
     with connected(flat.apartment.bus, ["service/+/status", "home/Kitchen_Light/+", "camera/ip1/#"]) as bus:
         for name in BUS_SERVICES:
