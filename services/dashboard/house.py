@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import time
 import uuid
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,6 +41,7 @@ class House:
     tries: Tries = field(default_factory=Tries)
     sessions: Sessions = field(init=False)
     closing: list[Callable[[], Awaitable[None]]] = field(default_factory=list)  # what ends with the server
+    running: list[Callable[[], Coroutine[None, None, None]]] = field(default_factory=list)  # what runs as long as it
     _questions: dict[str, asyncio.Future[HistoryReply]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import httpx
 import pytest
 from openapi_spec_validator import validate
 
-from services import peers
+from services import peers, topics
 from services.dashboard.sessions import FREE_TRIES
+from services.payloads import HistoryReply, seconds
 from tests.dashboard.parts import PASSWORD, USERS, Running, running
 
 pytestmark = pytest.mark.mosquitto
@@ -93,7 +95,7 @@ def test_a_login_makes_a_new_session_that_no_script_can_read(guarded: Running) -
         assert person.get("/api/session").json()["role"] == "operator"
         person.login("ann")
         assert person.http.cookies["apartment"] != first
-        with httpx.Client(base_url=guarded.url, cookies={"apartment": first}, trust_env=False) as old:
+        with httpx.Client(base_url=guarded.url, cookies={"apartment": first}, trust_env=False, timeout=30) as old:
             assert old.get("/api/apartment").status_code == 401
 
 
@@ -101,7 +103,7 @@ def test_logging_out_ends_the_session(guarded: Running) -> None:
     with guarded.browser("ann") as person:
         token = person.http.cookies["apartment"]
         assert person.post("/api/logout").status_code == 200
-        with httpx.Client(base_url=guarded.url, cookies={"apartment": token}, trust_env=False) as again:
+        with httpx.Client(base_url=guarded.url, cookies={"apartment": token}, trust_env=False, timeout=30) as again:
             assert again.get("/api/apartment").status_code == 401
 
 
@@ -146,13 +148,13 @@ def test_a_form_cannot_log_in(guarded: Running) -> None:
      ("evil.example", False), ("evil.example:8088", False), ("", False), ("127.0.0.1.evil.example", False)],
 )  # fmt: skip
 def test_only_our_own_names_are_answered(guarded: Running, host: str, known: bool) -> None:
-    answer = httpx.get(f"{guarded.url}/api/session", headers={"Host": host}, trust_env=False)
+    answer = httpx.get(f"{guarded.url}/api/session", headers={"Host": host}, trust_env=False, timeout=30)
     assert answer.status_code == (200 if known else 403)
 
 
 @pytest.mark.parametrize("path", ["/", "/main.js", "/api/session", "/nothing", "/../settings.py", "/api/live"])
 def test_every_answer_carries_the_strict_headers(guarded: Running, path: str) -> None:
-    headers = httpx.get(f"{guarded.url}{path}", trust_env=False).headers
+    headers = httpx.get(f"{guarded.url}{path}", trust_env=False, timeout=30).headers
     policy = headers["content-security-policy"]
     assert "default-src 'none'" in policy
     assert "frame-ancestors 'none'" in policy
@@ -253,6 +255,57 @@ def test_a_page_hears_of_a_change_within_a_moment(guarded: Running) -> None:
         data = next(line for line in lines if line.startswith("data: [[") and "19.5" in line)
         heard_ms = json.loads(data[6:])[0][2]
     assert abs(heard_ms / 1000 - begin) < 15.0
+
+
+def answered(guarded: Running, path: str, **replies: dict[str, object]) -> httpx.Response:
+    """The answer to a question that the history service is played for; `replies` by what is asked."""
+    guarded.bus.forget()
+    with guarded.browser("vic") as person, ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(person.get, path)
+        told: set[str] = set()
+        while len(told) < len(replies):
+            asked = guarded.bus.payload("history/get", lambda one: one.id not in told, 20.0)
+            told.add(asked.id)
+            reply = HistoryReply(id=asked.id, item=asked.item, samples=[]).model_copy(update=replies[asked.what])
+            guarded.bus.publish(topics.HISTORY_REPLY.message(reply, id=asked.id))
+        return waiting.result(30.0)
+
+
+BUCKETS = {"unit": "°C", "buckets": [("2026-01-31T07:05:00Z", 3, 20.0, 20.5, 21.0)]}
+
+
+def test_what_was_of_a_number_comes_in_as_many_points_as_a_plot_has(guarded: Running) -> None:
+    path = "/api/history/Kitchen_Temp?since=2026-01-31T00:00:00Z&until=2026-02-01T00:00:00Z&points=100"
+    series = answered(guarded, path, samples=BUCKETS).json()
+    assert series["every"] == 900  # the least round width that gives no more than 100
+    assert series["unit"] == "°C"
+    assert series["rows"] == [[seconds("2026-01-31T07:05:00Z"), 20.0, 20.5, 21.0]]
+
+
+def test_what_was_of_a_state_begins_with_what_it_was_before(guarded: Running) -> None:
+    path = "/api/history/Kitchen_Light?since=2026-01-31T00:00:00Z&until=2026-02-01T00:00:00Z"
+    series = answered(
+        guarded, path, changes={"samples": [("2026-01-31T07:05:00Z", "ON")]},
+        last={"samples": [("2026-01-29T07:05:00Z", "OFF")]},
+    ).json()  # fmt: skip
+    since = seconds("2026-01-31T00:00:00Z")
+    assert series["rows"] == [[since, "OFF"], [seconds("2026-01-31T07:05:00Z"), "ON"]]
+
+
+def test_a_table_holds_nothing_that_a_spreadsheet_would_run(guarded: Running) -> None:
+    samples = {"samples": [("2026-01-31T07:05:00Z", '=HYPERLINK("x")')]}
+    path = "/api/history/Bedroom_Mode.csv?since=2026-01-31T00:00:00Z&until=2026-02-01T00:00:00Z"
+    table = answered(guarded, path, changes=samples, last={}).text
+    assert table == 'time,state\r\n2026-01-31T07:05:00.000Z,"\'=HYPERLINK(""x"")"\r\n'
+
+
+@pytest.mark.parametrize(
+    "query", ["since=yesterday", "since=2026-02-01T00:00:00Z&until=2026-01-01T00:00:00Z", "points=0", "points=9999999"]
+)
+def test_a_span_that_is_none_is_told(guarded: Running, query: str) -> None:
+    with guarded.browser("vic") as person:
+        assert person.get(f"/api/history/Kitchen_Temp?{query}").status_code == 422
+        assert person.get("/api/history/Nothing").status_code == 422
 
 
 def test_a_robots_map_is_a_picture(guarded: Running) -> None:

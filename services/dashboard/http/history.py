@@ -61,10 +61,10 @@ def endpoints(house: House) -> list[Endpoint]:
     span = (("since", "ISO 8601 with an offset; a day ago without."), ("until", "The same; now without."),
             ("points", f"How many at most; {POINTS} without."))  # fmt: skip
     return [
+        Endpoint("GET", "/api/history/{item}.csv", "viewer", "What was of an item, as a table.", table,
+                 answer="text/csv", query=span),
         Endpoint("GET", "/api/history/{item}", "viewer", "What was of an item.", history, answer=Series, query=span),
-        Endpoint("GET", "/api/history/{item}.csv", "viewer", "The same as a table.", table, answer="text/csv",
-                 query=span),
-    ][::-1]  # fmt: skip
+    ]  # fmt: skip
 
 
 async def _numbers(house: House, item: str, since: float, until: float, points: int) -> Series:

@@ -9,6 +9,7 @@ from starlette.responses import Response, StreamingResponse
 from services import topics
 from services.dashboard.house import House
 from services.dashboard.http.endpoint import Asked, Endpoint
+from services.dashboard.http.thumbnails import Thumbnails
 from services.dashboard.http.video import BOUNDARY, Videos
 from services.errors import BadMessage, Unavailable
 
@@ -19,7 +20,9 @@ SNAPSHOT = "snapshot.jpg"
 def endpoints(house: House) -> list[Endpoint]:
     """The rows."""
     videos = Videos()
+    thumbnails = Thumbnails(house, videos)
     house.closing.append(videos.close)
+    house.running.append(thumbnails.run)
 
     def address(asked: Asked) -> str:
         camera = asked.path("camera")
@@ -45,7 +48,15 @@ def endpoints(house: House) -> list[Endpoint]:
             raise BadMessage(f"{asked.path('robot')[:80]!r} has no map")
         return Response(data, 200, {"cache-control": "private, max-age=60"}, "image/png")
 
+    async def thumbnail(asked: Asked) -> Response:
+        data = thumbnails.get(asked.path("camera"), asked.path("place"))
+        if data is None:
+            raise BadMessage("there is no picture of that place yet")
+        return Response(data, 200, {"cache-control": "private, max-age=3600"}, "image/jpeg")
+
     return [
+        Endpoint("GET", "/api/cameras/{camera}/places/{place}/thumbnail.jpg", "viewer", "A place, small.", thumbnail,
+                 answer="image/jpeg"),
         Endpoint("GET", "/api/cameras/{camera}/stream.mjpg", "viewer", "The moving picture.", stream,
                  answer="multipart/x-mixed-replace"),
         Endpoint("GET", "/api/cameras/{camera}/snapshot.jpg", "viewer", "The picture now.", snapshot,

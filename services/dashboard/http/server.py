@@ -75,9 +75,13 @@ class Server:
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._running.set()
+        beside = [asyncio.create_task(one()) for one in self._house.running]
         try:
             await self._uvicorn.serve(sockets=[self._socket])
         finally:
+            for task in beside:
+                task.cancel()
+            await asyncio.gather(*beside, return_exceptions=True)
             await self._house.close()
 
 

@@ -1,4 +1,165 @@
-// Made next.
-import { head } from "../dom.js";
-export const topics = [];
-export function show(root) { root.append(head("camera")); }
+// A camera: its picture, turning it by click, joystick and place, its orders, its scan, its sound.
+
+import * as api from "../api.js";
+import { ago, badge, clock, h, head, icon, text } from "../dom.js";
+import * as live from "../live.js";
+import { joystick } from "./joystick.js";
+import { video } from "./video.js";
+
+export const topics = ["camera/#", "/dashboard/thumbnails/+"];
+
+const LOGGED = 8;
+const KINDS = { online: "good", degraded: "warn" };
+
+export function show(root, context) {
+  const names = context.apartment.cameras.map((camera) => camera.name);
+  const stage = h("div", { class: "stage" });
+  let close = () => {};
+  const choose = (name) => {
+    close();
+    localStorage.setItem("camera", name);
+    close = one(stage, context.apartment.cameras.find((camera) => camera.name === name), context.may, state);
+  };
+  const state = h("span", { class: "row" });
+  const kept = names.includes(localStorage.getItem("camera")) ? localStorage.getItem("camera") : names[0];
+  const pick = names.length > 1 ? h("select", { "aria-label": "Camera", onchange: () => choose(pick.value) }, names.map((name) => h("option", { value: name }, name))) : null;
+  if (pick) pick.value = kept;
+  root.append(head("Camera", pick, state), stage);
+  if (kept) choose(kept);
+  else stage.append(h("p", { class: "empty" }, "No camera is configured."));
+  return () => close();
+}
+
+function one(stage, camera, may, state) {
+  const name = camera.name;
+  const at = (rest) => `camera/${name}/${rest}`;
+  const order = (key, value) => api.order(`/api/cameras/${name}/orders/${key}`, { value });
+  const picture = video(name, may && camera.lens && camera.mount ? (right, down) => api.order(`/api/cameras/${name}/centre`, { right, down }) : null);
+  const where = h("dl", { class: "where" });
+  const streaming = h("button", { onclick: () => order("MJPEG", streaming.getAttribute("aria-pressed") !== "true"), "aria-pressed": "false" }, "Live picture");
+  const stops = [];
+  const parts = [places(name, may, order, stops), may ? controls(order, stops) : null, scan(camera, may, order, stops), may ? looks(name, order) : null, may ? sound(name, order, stops) : null, log(name, stops)];
+  stage.replaceChildren(h("div", { class: "columns camera" },
+    h("div", { class: "stack" },
+      h("section", { class: "panel flush" }, picture.element, h("div", { class: "below" }, where, may ? streaming : null)),
+      parts[0]),
+    h("div", { class: "stack" }, parts.slice(1))));
+
+  const line = (label, value) => h("div", {}, h("dt", {}, label), h("dd", {}, value));
+  stops.push(
+    live.watch(at("position"), ({ json }) => where.replaceChildren(line("Pan", `${json.pan.toFixed(1)}°`), line("Tilt", `${json.tilt.toFixed(1)}°`), line("Zoom", `${json.zoom}`), line("Place", json.moving ? "moving …" : (json.place ?? "–")))),
+    live.watch(at("status"), ({ json }) => state.replaceChildren(badge(json.state, KINDS[json.state] ?? "bad"), h("span", { class: "hint" }, json.reason))),
+    live.watch(at("stream"), ({ json }) => {
+      streaming.setAttribute("aria-pressed", `${json.mjpeg}`);
+      text(streaming, json.mjpeg ? "Live picture: on" : "Live picture: off");
+      picture.show(json.mjpeg || json.rtsp);
+    }),
+  );
+  return () => {
+    for (const stop of stops) stop();
+    picture.close();
+    stage.replaceChildren();
+  };
+}
+
+const panel = (title, ...children) => h("section", { class: "panel" }, h("h2", {}, title), children);
+
+function controls(order, stops) {
+  const stick = joystick((direction, speed, seconds) => order("Move", `${direction} ${speed} ${seconds}`), () => order("Move", "Stop"));
+  stops.push(() => stick.close());
+  const zoom = (way, drawing) => h("button", { onclick: () => order("Zoom", way), "aria-label": `Zoom ${way.toLowerCase()}` }, icon(drawing));
+  return panel("Turn", h("div", { class: "turn" }, stick.element, h("div", { class: "zoom" }, zoom("In", "more"), h("span", { class: "hint" }, "Zoom"), zoom("Out", "less"))));
+}
+
+function places(name, may, order, stops) {
+  const list = h("ul", { class: "places" });
+  const fresh = h("input", { id: "place", maxlength: 80, required: true, placeholder: "New place", "aria-label": "Name of the new place" });
+  const save = async (event) => {
+    event.preventDefault();
+    if (await order("SaveAs", fresh.value)) fresh.value = "";
+  };
+  const draw = () => {
+    const known = live.get(`camera/${name}/places`)?.json ?? {};
+    const here = live.get(`camera/${name}/position`)?.json?.place;
+    const pictures = live.get(`/dashboard/thumbnails/${name}`)?.json ?? {};
+    const wanted = JSON.stringify([Object.keys(known), here, pictures]);
+    if (list.dataset.shown === wanted) return;
+    list.dataset.shown = wanted;
+    list.replaceChildren(...Object.keys(known).map((place) => {
+      const source = `/api/cameras/${name}/places/${encodeURIComponent(place)}/thumbnail.jpg?${pictures[place]}`;
+      return h("li", {}, h("button", { onclick: () => order("Goto", place), disabled: !may, "aria-current": place === here ? "true" : null },
+        pictures[place] ? h("img", { src: source, alt: "", loading: "lazy" }) : h("span", { class: "blank" }, icon("camera")), h("span", {}, place)));
+    }));
+  };
+  stops.push(live.watch(`camera/${name}/places`, draw), live.watch(`camera/${name}/position`, draw), live.watch(`/dashboard/thumbnails/${name}`, draw));
+  const remove = h("button", { class: "quiet", onclick: () => {
+    const here = live.get(`camera/${name}/position`)?.json?.place;
+    if (here && confirm(`Forget the place ${here}?`)) order("Remove", here);
+  } }, "Forget this place");
+  return panel("Places", list, may ? h("form", { class: "row", onsubmit: save }, fresh, h("button", { type: "submit" }, "Save here"), remove) : null);
+}
+
+function scan(camera, may, order, stops) {
+  const { name } = camera;
+  const targets = h("input", { id: "targets", value: camera.targets.join(", "), size: 12, inputmode: "numeric", placeholder: "582, 17" });
+  const bar = h("progress", { max: 1, value: 0, "aria-label": "Progress of the scan" });
+  const said = h("p", { class: "hint" });
+  const start = h("button", { class: "main", onclick: () => order("Scan", { targets: targets.value.split(/[^0-9]+/).filter(Boolean).map(Number) }) }, "Scan");
+  const cancel = h("button", { onclick: () => order("Scan", false) }, "Cancel");
+  const found = h("ul", { class: "found" });
+  stops.push(live.watch(`camera/${name}/scan/state`, ({ json }) => {
+    const running = json.state === "running";
+    bar.value = running || json.state === "done" ? json.progress : 0;
+    cancel.disabled = !running;
+    const turn = json.turn > 1 ? `, turn ${json.turn}` : "";
+    text(said, running ? `Looking from ${json.place ?? "…"}${turn}: ${json.frames_analysed} pictures, ${Math.round(json.elapsed_s)} s` : `${json.state}${json.reason ? `: ${json.reason}` : ""}${json.state === "done" ? ` in ${Math.round(json.elapsed_s)} s, found ${json.found.join(", ") || "nothing"}` : ""}`);
+  }));
+  const draw = () => found.replaceChildren(...live.all(`camera/${name}/marker/+`).map(({ json }) => {
+    const p = json.position;
+    const sigma = json.covariance ? Math.sqrt(Math.max(json.covariance[0][0], json.covariance[1][1], json.covariance[2][2])) : null;
+    return h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, json.place, h("span", { class: "hint" }, ` ${ago(Date.parse(json.stamp))}`)),
+      h("span", { class: "number" }, p ? `${p.x.toFixed(2)}, ${p.y.toFixed(2)}, ${p.z.toFixed(2)} m${sigma ? ` ± ${(sigma * 1000).toFixed(0)} mm` : ""}` : json.why));
+  }));
+  stops.push(live.watch(`camera/${name}/marker/+`, draw));
+  return panel("Scan for markers", may ? h("div", { class: "row" }, h("label", { class: "inline", for: "targets" }, "Markers"), targets, start, cancel) : null, bar, said, found);
+}
+
+function looks(name, order) {
+  const pair = (key, label) => h("div", { class: "pair-row" }, h("span", {}, label), h("span", { class: "buttons" },
+    h("button", { onclick: () => order(key, true), "aria-label": `${label} on` }, "On"), h("button", { onclick: () => order(key, false), "aria-label": `${label} off` }, "Off")));
+  const mode = h("select", { "aria-label": "Video mode", onchange: () => mode.value && order("VideoMode", mode.value) },
+    [["", "Choose …"], ["auto", "Automatic"], ["color", "Colour"], ["bw", "Black and white"], ["scan", "For scans"]].map(([value, label]) => h("option", { value }, label)));
+  return panel("Picture", pair("Privacy", "Privacy"), pair("Flip", "Flip"), pair("Mirror", "Mirror"),
+    h("div", { class: "pair-row" }, h("span", {}, "Video mode"), mode),
+    h("div", { class: "row" }, h("a", { class: "button", href: `/api/cameras/${name}/snapshot.jpg`, download: `${name}.jpg` }, "Snapshot"),
+      h("button", { class: "danger", onclick: () => confirm("Restart the camera? It is away for about a minute.") && order("Reboot", true) }, "Restart camera")));
+}
+
+function sound(name, order, stops) {
+  const seconds = h("input", { id: "seconds", type: "number", min: 1, max: 600, value: "5" });
+  const file = h("input", { id: "file", list: "files", placeholder: "hello.wav" });
+  const files = h("datalist", { id: "files" });
+  const heard = h("p", { class: "hint" });
+  const known = new Set();
+  stops.push(live.watch(`camera/${name}/audio`, ({ json }) => {
+    known.add(json.file);
+    files.replaceChildren(...[...known].map((one) => h("option", { value: one })));
+    text(heard, `Recorded ${json.file}, ${json.seconds.toFixed(1)} s`);
+  }));
+  return panel("Sound",
+    h("div", { class: "row" }, h("label", { class: "inline", for: "seconds" }, "Seconds"), seconds, h("button", { onclick: () => order("AudioRec", seconds.value) }, "Record")),
+    h("div", { class: "row" }, h("label", { class: "inline", for: "file" }, "File"), file, files, h("button", { onclick: () => file.value && order("AudioPlay", file.value) }, "Play")), heard);
+}
+
+function log(name, stops) {
+  const list = h("ol", { class: "log" });
+  const orders = new Map();
+  stops.push(live.watch(`camera/${name}/order_result`, ({ json, at }) => {
+    orders.delete(json.id);
+    orders.set(json.id, { json, at });
+    const shown = [...orders.values()].filter((one) => one.json.key !== "Move" || one.json.error).slice(-LOGGED).reverse();
+    list.replaceChildren(...shown.map((one) => h("li", {}, h("time", {}, clock(one.at)), h("span", {}, `${one.json.key} ${typeof one.json.value === "string" ? one.json.value : ""}`),
+      badge(one.json.state, { done: "good", failed: "bad", refused: "bad" }[one.json.state] ?? ""), one.json.error ? h("span", { class: "hint" }, one.json.error) : null)));
+  }));
+  return panel("Orders", list);
+}

@@ -1,4 +1,81 @@
-// Made next.
-import { head } from "../dom.js";
-export const topics = [];
-export function show(root) { root.append(head("missions")); }
+// Missions of the robots: sent, watched and cancelled here; and where a marker was last.
+
+import * as api from "../api.js";
+import { ago, badge, clock, h, head, text } from "../dom.js";
+import * as live from "../live.js";
+
+export const topics = ["mission/#", "robot/+/goto/result"];
+
+const ENDS = { found: "good", not_found: "warn", failed: "bad", cancelled: "", refused: "bad" };
+const WORDS = { idle: "Waiting for orders", go: "On the way", look: "Looking", scan: "The house looks", found: "Found", not_found: "Not found", failed: "Failed", cancelled: "Cancelled", refused: "Refused" };
+
+export function show(root, { apartment, may }) {
+  root.append(head("Missions"));
+  const closes = apartment.robots.map((robot) => one(root, robot.name, may));
+  if (!apartment.robots.length) root.append(h("p", { class: "empty" }, "No robot is configured."));
+  return () => { for (const close of closes) close(); };
+}
+
+function one(root, name, may) {
+  const marker = h("input", { id: `marker-${name}`, type: "number", min: 0, max: 9999, required: true, value: "582" });
+  const id = () => Number(marker.value);
+  const cancel = h("button", { class: "danger", onclick: () => api.order(`/api/missions/${name}/cancel`) }, "Cancel");
+  const where = h("button", { onclick: () => api.order(`/api/missions/${name}/where`, { find: id() }), type: "button" }, "Where was it last?");
+  const submit = (event) => {
+    event.preventDefault();
+    api.order(`/api/missions/${name}/find`, { find: id() });
+  };
+  const now = h("p", { class: "now" });
+  const why = h("p", { class: "hint" });
+  const steps = h("ol", { class: "timeline" });
+  const answer = h("ul", { class: "found" });
+  const results = h("div", { class: "stack" });
+  const form = may ? h("form", { class: "row", onsubmit: submit }, h("label", { class: "inline", for: marker.id }, "Marker"), marker, h("button", { class: "main", type: "submit" }, "Find"), cancel, where) : null;
+  root.append(h("div", { class: "columns missions" },
+    h("div", { class: "stack" }, h("section", { class: "panel", "data-robot": name }, h("h2", {}, name), form, now, why, steps), h("section", { class: "panel", hidden: true }, h("h2", {}, "Last seen"), answer)),
+    h("section", { class: "panel" }, h("h2", {}, "Past missions"), results)));
+  const states = [];
+  const past = new Map();
+  const stops = [
+    live.watch(`mission/${name}/state`, ({ json, at }) => {
+      text(now, `${WORDS[json.state] ?? json.state}${json.marker === null ? "" : `: marker ${json.marker}`}${json.place ? `, ${json.place}` : ""}`);
+      text(why, [json.reason, json.waiting.length ? `${json.waiting.length} waiting` : ""].filter(Boolean).join(" · "));
+      cancel.disabled = json.id === null && !json.waiting.length;
+      if (json.id === null) return;
+      if (states.length && states.at(-1).id !== json.id) states.length = 0;
+      const last = states.at(-1);
+      if (!last || last.state !== json.state || last.place !== json.place || last.reason !== json.reason) states.push({ ...json, at });
+      steps.replaceChildren(...states.map((step, index) => h("li", { class: index === states.length - 1 ? "current" : "", "data-state": step.state },
+        h("time", {}, clock(step.at)), h("span", {}, WORDS[step.state] ?? step.state, step.place ? `: ${step.place}` : ""), h("span", { class: "hint" }, step.reason))));
+    }),
+    live.watch(`mission/${name}/result`, ({ json }) => {
+      past.set(json.id, json);
+      results.replaceChildren(...[...past.values()].reverse().map((result, index) => told(result, index === 0)));
+      if (states.at(-1)?.id === json.id) states.length = 0;
+    }),
+    live.watch(`mission/${name}/where/reply/+`, ({ json, fresh }) => {
+      if (!fresh) return;
+      answer.parentElement.hidden = false;
+      answer.replaceChildren(...json.sightings.map((seen) => h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, `${seen.place ?? "somewhere"}, by ${seen.by}`, h("span", { class: "hint" }, ` ${ago(Date.parse(seen.stamp))}`)),
+        h("span", { class: "number" }, seen.position ? `${seen.position.x.toFixed(2)}, ${seen.position.y.toFixed(2)} m` : "", seen.sigma_m ? ` ± ${(seen.sigma_m * 1000).toFixed(0)} mm` : ""))));
+      if (!json.sightings.length) answer.append(h("li", {}, `Nobody has seen marker ${json.marker}`));
+    }),
+  ];
+  if (!past.size) results.append(h("p", { class: "empty" }, "None since the dashboard was started."));
+  return () => { for (const stop of stops) stop(); };
+}
+
+function told(result, open) {
+  const total = Math.max(result.elapsed_s, 0.001);
+  const bars = result.story.map((event, index) => {
+    const share = (((result.story[index + 1]?.at_s ?? result.elapsed_s) - event.at_s) / total) * 100;
+    const part = h("span", { "data-state": event.state, title: `${WORDS[event.state] ?? event.state}: ${event.text}` });
+    part.style.flexGrow = Math.max(0.6, share);
+    return part;
+  });
+  const position = result.position ? `${result.position.x.toFixed(2)}, ${result.position.y.toFixed(2)} m` : "";
+  return h("details", { open }, h("summary", {}, h("strong", {}, `Marker ${result.marker}`), badge(WORDS[result.state] ?? result.state, ENDS[result.state]), h("span", { class: "hint" }, `${[result.place, position, result.by ? `by ${result.by}` : ""].filter(Boolean).join(" · ")}`), h("span", { class: "hint number" }, `${ago(Date.parse(result.stamp))} · ${Math.round(result.elapsed_s)} s`)),
+    result.reason ? h("p", { class: "hint" }, result.reason) : null,
+    h("div", { class: "bars", "aria-hidden": "true" }, bars),
+    h("ol", { class: "timeline" }, result.story.map((event) => h("li", { "data-state": event.state }, h("time", {}, `${event.at_s.toFixed(0)} s`), h("span", {}, WORDS[event.state] ?? event.state), h("span", { class: "hint" }, event.text)))));
+}

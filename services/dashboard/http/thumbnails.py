@@ -1,0 +1,120 @@
+"""Small pictures of a camera's places: taken when it stands at one anyhow, kept in the state folder.
+
+Not here: who shows them (`static/views/camera.js`); making them smaller is all that is done to pictures here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+import logging
+import time
+from pathlib import Path
+
+from services import topics
+from services.dashboard.house import House
+from services.dashboard.http.video import Videos
+from services.dashboard.thumbnail import smaller
+from services.dashboard.view import Entry
+from services.errors import Unavailable
+from services.payloads import Position
+
+log = logging.getLogger(__name__)
+TOPIC = "/dashboard/thumbnails/"  # our own: the places of a camera that have one, and since when (ms)
+LOOK_S = 1.0
+AGAIN_S = 3600.0  # a younger one is not taken again
+AFTER_FAILURE_S = 120.0
+
+
+class Thumbnails:
+    """`run` takes them as long as the server runs."""
+
+    def __init__(self, house: House, videos: Videos) -> None:
+        self.house, self.videos = house, videos
+        self.folder = house.config.state / "dashboard" / "thumbnails" if house.config.state else None
+        self._taken: dict[tuple[str, str], tuple[float, bytes]] = {}
+        self._not_before: dict[str, float] = {}
+
+    async def run(self) -> None:
+        """Until it is cancelled."""
+        while True:
+            await asyncio.sleep(LOOK_S)
+            for camera in self.house.config.cameras:
+                place = self._due(camera, time.time())
+                if place is not None:
+                    await self._take(camera, place)
+
+    def get(self, camera: str, place: str) -> bytes | None:
+        """The picture of a place."""
+        found = self._taken.get((camera, place)) or self._read(camera, place)
+        return found[1] if found else None
+
+    def _due(self, camera: str, now: float) -> str | None:
+        """The place whose picture is to be taken now: the camera stands there, and does nothing else."""
+        text = self.house.latest(topics.CAMERA_POSITION.name(cam=camera))
+        scan = self.house.latest(topics.CAMERA_SCAN_STATE.name(cam=camera))
+        self._tell(camera)
+        if text is None or (scan and json.loads(scan)["state"] == "running") or now < self._not_before.get(camera, 0):
+            return None
+        position = Position.model_validate_json(text)
+        if position.moving or position.place is None:
+            return None
+        found = self._taken.get((camera, position.place)) or self._read(camera, position.place)
+        return position.place if found is None or now - found[0] > AGAIN_S else None
+
+    async def _take(self, camera: str, place: str) -> None:
+        stream = self.house.latest(topics.CAMERA_STREAM.name(cam=camera))
+        if stream is None:
+            return
+        try:
+            data = await self.videos.snapshot(json.loads(stream)["url"].rpartition("/")[0] + "/snapshot.jpg")
+        except Unavailable as error:
+            log.info("no picture of %s at %s: %s", camera, place, error)
+            self._not_before[camera] = time.time() + AFTER_FAILURE_S
+            return
+        text = self.house.latest(topics.CAMERA_POSITION.name(cam=camera))
+        if text is None or Position.model_validate_json(text).place != place:
+            return  # it has turned away meanwhile
+        small = await asyncio.to_thread(smaller, data)
+        if small is not None:
+            self._taken[camera, place] = (time.time(), small)
+            self._write(camera, place, small)
+        else:
+            self._not_before[camera] = time.time() + AFTER_FAILURE_S
+        self._tell(camera)
+
+    def _tell(self, camera: str) -> None:
+        text = self.house.latest(topics.CAMERA_PLACES.name(cam=camera))
+        known = {}
+        for place in json.loads(text) if text else ():
+            found = self._taken.get((camera, place)) or self._read(camera, place)
+            if found is not None:
+                known[place] = round(found[0] * 1000)
+        told = json.dumps(known)
+        if self.house.latest(f"{TOPIC}{camera}") != told:
+            self.house.hub.spread([Entry(f"{TOPIC}{camera}", told, round(time.time() * 1000), "s")])
+
+    def _file(self, camera: str, place: str) -> Path | None:
+        """A place's name may hold anything, so its hash names the file."""
+        name = hashlib.sha256(f"{camera}/{place}".encode()).hexdigest()[:24]
+        return self.folder / f"{name}.jpg" if self.folder else None
+
+    def _read(self, camera: str, place: str) -> tuple[float, bytes] | None:
+        file = self._file(camera, place)
+        if file is None or not file.exists():
+            return None
+        found = self._taken[camera, place] = (file.stat().st_mtime, file.read_bytes())
+        return found
+
+    def _write(self, camera: str, place: str, small: bytes) -> None:
+        file = self._file(camera, place)
+        if file is None:
+            return
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            beside = file.with_suffix(".new")
+            beside.write_bytes(small)
+            beside.replace(file)
+        except OSError as error:
+            log.warning("%s cannot be kept: %s", file, error)
