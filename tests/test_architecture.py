@@ -194,7 +194,7 @@ PURE = (
     "services.dashboard.view", "services.dashboard.sessions", "services.dashboard.chart", "services.dashboard.aim",
     "services.mission.plan", "services.mission.state", "services.mission.events",
     "services.mission.moment", "services.mission.standing", "services.mission.memory", "services.mission.telling",
-    "services.mission.timeline",
+    "services.mission.both", "services.mission.refresh", "services.mission.timeline",
     "services.simulators.agenda", "services.simulators.climate", "services.simulators.robot.route",
     "services.simulators.robot.plan", "services.simulators.robot.sight", "services.simulators.robot.body",
     "services.simulators.robot.navigation",
