@@ -308,6 +308,22 @@ def test_a_span_that_is_none_is_told(guarded: Running, query: str) -> None:
         assert person.get("/api/history/Nothing").status_code == 422
 
 
+def test_a_page_that_is_open_hears_nothing_more_after_its_session_was_ended(guarded: Running) -> None:
+    with (
+        guarded.browser("ann") as person,
+        person.http.stream("GET", "/api/live", params={"topics": "diagnostics/#"}) as answer,
+    ):
+        lines = answer.iter_lines()
+        assert next(lines) == "event: snapshot"
+        assert person.post("/api/logout").status_code == 200
+        assert len(list(lines)) < 20  # diagnostics come every second: it ends at the next, or this one goes on for ever
+
+
+def test_a_stream_is_not_opened_by_head(guarded: Running) -> None:
+    with guarded.browser("vic") as person:
+        assert person.http.head("/api/live").status_code == 405
+
+
 def test_a_robots_map_is_a_picture(guarded: Running) -> None:
     with guarded.browser("vic") as person:
         answer = person.get("/api/robots/tiago/map.png")
