@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +15,9 @@ from openapi_spec_validator import validate
 
 from services import peers, topics
 from services.dashboard.sessions import FREE_TRIES
+from services.dashboard.settings import Tls
 from services.payloads import HistoryReply, seconds
+from tests.bus.test_tls import certificates
 from tests.dashboard.parts import PASSWORD, USERS, Running, running
 
 pytestmark = pytest.mark.mosquitto
@@ -322,6 +325,46 @@ def test_a_page_that_is_open_hears_nothing_more_after_its_session_was_ended(guar
 def test_a_stream_is_not_opened_by_head(guarded: Running) -> None:
     with guarded.browser("vic") as person:
         assert person.http.head("/api/live").status_code == 405
+
+
+def test_over_tls_the_cookie_goes_over_tls_alone(tmp_path: Path) -> None:
+    try:
+        ca, cert, key = certificates(tmp_path / "ca", "our own CA")
+    except peers.Missing as missing:
+        pytest.skip(str(missing))
+    with running(tmp_path / "tls", ca, users=USERS, tls=Tls(cert=cert, key=key)) as made, made.browser() as person:
+        assert made.url.startswith("https://")
+        answer = person.login("ann")
+        assert answer.headers["set-cookie"].startswith("__Host-apartment=")
+        assert "Secure" in answer.headers["set-cookie"]
+        assert "max-age" in answer.headers["strict-transport-security"]
+        assert person.get("/api/session").json()["user"] == "ann"
+        path = "/api/items/Kitchen_Light/command"
+        assert person.post(path, {"value": "ON"}, Origin=made.url).status_code == 202
+        assert person.post(path, {"value": "ON"}, Origin=made.url.replace("https", "http")).status_code == 403
+
+
+def test_who_does_not_read_keeps_nobody_waiting(guarded: Running) -> None:
+    """More than the network's own buffers hold goes to a page that takes nothing, and to one beside it."""
+    items, rounds, text = 50, 12, "x" * 15_000
+    host, port = guarded.url.removeprefix("http://").split(":")
+    with guarded.browser("vic") as person, socket.socket() as lazy:
+        lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        lazy.connect((host, int(port)))
+        cookie = f"Cookie: apartment={person.http.cookies['apartment']}"
+        lazy.sendall(
+            f"GET /api/live?topics=home/%2B/state HTTP/1.1\r\nHost: {host}:{port}\r\n{cookie}\r\n\r\n".encode()
+        )
+        with person.http.stream("GET", "/api/live", params={"topics": "home/+/state"}) as answer:
+            lines = answer.iter_lines()
+            assert next(lines) == "event: snapshot"
+            for number in range(rounds):
+                for item in range(items):
+                    guarded.bus.say(f"home/Large_{item}/state", f"{number} {text}", retain=True)
+                assert next(line for line in lines if f'Large_{items - 1}/state","{number} xxx' in line)
+        assert lazy.recv(12) == b"HTTP/1.1 200"
+    for item in range(items):
+        guarded.bus.say(f"home/Large_{item}/state", "", retain=True)
 
 
 def test_a_robots_map_is_a_picture(guarded: Running) -> None:
