@@ -18,7 +18,7 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, topics
 from services.bus import Message
-from services.command_line import calibrate, dashboard, install, mission, openhab, secrets, stored
+from services.command_line import backup, calibrate, dashboard, doctor, install, mission, openhab, secrets, stored
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -199,6 +199,9 @@ def probe(
 
 
 stored.add_to(app)
+app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
+app.command(epilog="Example: apartment restore apartment.zip")(backup.restore)
+app.command(epilog="Example: apartment doctor")(doctor.doctor)
 app.command(epilog="Example: apartment install --dry-run")(install.install)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(dashboard.app, name="dashboard")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import shutil
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -102,12 +102,22 @@ def _wait_for_cameras(apartment: Apartment, names: Collection[str]) -> None:
 
 
 @contextmanager
-def services_of(folder: Path, parts: Parts, without: Collection[str] = ()) -> Iterator[Simulated]:
-    """Starts the services, waits until they and the cameras answer, and ends them with the block."""
+def services_of(
+    folder: Path,
+    parts: Parts,
+    without: Collection[str] = (),
+    only: Collection[str] = (),
+    change: Callable[[Path], None] = lambda _: None,
+) -> Iterator[Simulated]:
+    """Starts the services, waits until they and the cameras answer, and ends them with the block.
+
+    `only`: these and no others. `change` is given the copy of the configuration before anything reads it.
+    """
     config = folder / "config" / "simulated.yaml"
     shutil.copytree(CONFIG, config.parent)  # saved places and the like are not to change the repository
+    change(config)
     apartment = load(config, environment={**os.environ, **parts.environment})
-    names = [name for name in apartment.instances if name not in without]
+    names = [name for name in apartment.instances if name not in without and (not only or name in only)]
     supervisor = Supervisor(commands(processes(apartment, names), config), parts.environment, folder / "services.log")
     with in_background(supervisor) as ready:
         _wait_for_cameras(apartment, names)

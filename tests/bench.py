@@ -32,6 +32,7 @@ from services.runner import Runner
 from tests.bridge import bench as bridge_bench
 from tests.camera import goal_figures, scan_figures
 from tests.dashboard import bench as dashboard_bench
+from tests.mission import bench as mission_bench
 from tests.persistence import figures as writer_figures
 from tests.vision import bench as vision_bench
 
@@ -207,6 +208,12 @@ def vision_part(_: Path, __: int) -> Part:
     return vision_bench.table(rows), [asdict(row) for row in rows]
 
 
+def mission_part(_: Path, __: int) -> Part:
+    """Missions in random flats."""
+    figures = mission_bench.figures()
+    return mission_bench.table(figures), list(mission_bench.plain(figures))
+
+
 def dashboard_part(folder: Path, _: int) -> Part:
     """The dashboard."""
     rows = list(dashboard_bench.rows(folder))
@@ -220,6 +227,7 @@ PARTS: dict[str, Callable[[Path, int], Part]] = {
     "bridge": bridge_part,
     "scan": scan_part,
     "vision": vision_part,
+    "mission": mission_part,
     "dashboard": dashboard_part,
 }
 

@@ -38,17 +38,17 @@ class Door:
 
     def state(self) -> dict[str, Any]:
         """The true pose, and whether it moves."""
-        answer: dict[str, Any] = httpx.get(f"{self.url}/state").json()
+        answer: dict[str, Any] = httpx.get(f"{self.url}/state", timeout=30).json()
         return answer
 
     def log(self) -> list[dict[str, Any]]:
         """Every request that the camera met."""
-        answer: list[dict[str, Any]] = httpx.get(f"{self.url}/log").json()
+        answer: list[dict[str, Any]] = httpx.get(f"{self.url}/log", timeout=30).json()
         return answer
 
     def tell(self, path: str, **content: object) -> None:
         """An order of the side door."""
-        httpx.post(f"{self.url}/{path}", json=content).raise_for_status()
+        httpx.post(f"{self.url}/{path}", json=content, timeout=30).raise_for_status()
 
     @property
     def moving(self) -> bool:
@@ -116,7 +116,7 @@ class SmallFlat:
         """A table of the camera's configuration, asked for as any client would."""
         auth = httpx.DigestAuth("ros", PASSWORD)
         target = f"{self.urls[camera]}/cgi-bin/configManager.cgi?action=getConfig&name={name}"
-        lines = httpx.get(target, auth=auth).raise_for_status().text.splitlines()
+        lines = httpx.get(target, auth=auth, timeout=30).raise_for_status().text.splitlines()
         return dict(line.removeprefix("table.").split("=", 1) for line in lines if "=" in line)
 
     @contextmanager

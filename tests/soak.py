@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from tests import trials
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
 from tests.camera.scan.scenes import scan_a_scene
+from tests.mission import flat_trials
+from tests.mission import trials as mission_trials
 from tests.persistence import trials as writer_trials
 from tests.small_flat import SmallFlat, small_flat
 from tests.vision import mount_trials, positions
@@ -104,6 +107,23 @@ def lost_by_the_broker(one: writer_trials.Site, rng: random.Random, *, backlog: 
     return 100.0 * lost / acknowledged
 
 
+@contextmanager
+def missions() -> Iterator[Turn]:
+    """A mission from the bedroom in a new flat each turn, on real parts, with an accident in the middle."""
+
+    accidents = cycle(mission_trials.ACCIDENTS)
+
+    def turn(_: random.Random) -> float:
+        accident = next(accidents)
+        with tempfile.TemporaryDirectory() as name, mission_trials.flat(Path(name), mission_trials.BEDROOM) as one:
+            end, seconds = mission_trials.find(one, 582, accident)
+        Console().print(f"accident {accident}: {end.state} after {seconds:.1f} s: {end.reason}")
+        assert end.state == "found", end
+        return seconds
+
+    yield turn
+
+
 PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "kills": (lambda: real(lambda flat, rng: trials.kill(flat, rng.choice(trials.BUS_SERVICES))), 40, "s until online"),
     "camera": (lambda: real(lambda flat, rng: trials.kill_camera(flat)), 10, "s until an order is done"),
@@ -146,7 +166,10 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "moves": (lambda: virtual(move), 200, "s, virtual"),
     "scans": (lambda: virtual(scan), 50, "s, virtual"),
     "calibration": (mount_trials.calibrations, 150, "mm off, of the mount"),
+    "mission": (missions, 10, "s until found and confirmed"),
     "scenes": (lambda: nullcontext(lambda rng: scan_a_scene(rng)), 24, "s, virtual"),
+    "flats": (lambda: nullcontext(flat_trials.a_flat), 20, "s, virtual"),
+    "real-flats": (lambda: nullcontext(flat_trials.on_real_parts), 2, "x the virtual time"),
     "detector": (detector_trials.in_numbers, 100, "false markers in 50 frames"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }

@@ -8,9 +8,12 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 
+from services.__main__ import app
 from services.simulated import Simulated
 
 pytest_plugins = ["pytester"]
@@ -21,6 +24,7 @@ SHELL = [
     for block in re.findall(r"```sh\n(.*?)```", README, re.S)
     for line in block.splitlines()
 ]
+CODE = re.compile(r"```sh\n(.*?)```|`([^`\n]+)`", re.S)
 LONG = ("apartment run", "mosquitto_sub", "rostopic echo")  # they go on until somebody ends them
 
 
@@ -61,11 +65,28 @@ def test_the_example_test_of_the_readme_runs(pytester: pytest.Pytester, simulate
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "serve", "simulate", "demo", "check", "topics", "status", "order", "scan", "history"]
+    "command",
+    [
+        "run",
+        "serve",
+        "simulate",
+        "demo",
+        "check",
+        "topics",
+        "status",
+        "order",
+        "scan",
+        "history",
+        "doctor",
+        "install",
+        "backup",
+        "restore",
+        "secrets init",
+    ],
 )
 def test_every_command_has_help_with_an_example(command: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "services", command, "--help"], capture_output=True, text=True, timeout=60,
+        [sys.executable, "-m", "services", *command.split(), "--help"], capture_output=True, text=True, timeout=60,
         env={**os.environ, "COLUMNS": "200"},
     )  # fmt: skip
     assert done.returncode == 0
@@ -97,3 +118,23 @@ def test_exit_codes_tell_what_went_wrong(words: list[str], code: int, simulated_
     )
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_the_links_of_the_documentation_lead_somewhere() -> None:
+    for page in sorted((ROOT / "docs").glob("*.md")):
+        for link in re.findall(r"\]\((?!http)([^)#]+)", page.read_text(encoding="utf-8")):
+            assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+def test_the_commands_that_the_documentation_names_exist() -> None:
+    """Without their arguments: `apartment secrets renew` has a command of that name."""
+    root: Any = typer.main.get_command(app)
+    for page in sorted((ROOT / "docs").glob("*.md")):
+        for words in re.findall(
+            r"\bapartment ([a-z][a-z-]*(?: [a-z][a-z-]*)*)",
+            " ; ".join(a or b for a, b in CODE.findall(page.read_text("utf-8"))),
+        ):
+            first, *more = words.split()
+            assert first in root.commands, f"{page.name}: apartment {words}"
+            inner = getattr(root.commands[first], "commands", None)
+            assert inner is None or not more or more[0] in inner, f"{page.name}: apartment {words}"

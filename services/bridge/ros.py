@@ -32,7 +32,7 @@ LEAVE_S = 2.0  # saying goodbye to a master that hangs must not hold up our end
 LARGE = 2**24  # bytes; rospy drops older pictures only when they fit into its buffer together
 PACKAGES = (
     "python3-rospy python3-diagnostic-msgs python3-geometry-msgs python3-sensor-msgs python3-std-srvs "
-    "python3-tf2-msgs python3-nav-msgs"
+    "python3-tf2-msgs python3-nav-msgs python3-actionlib-msgs"
 )
 
 log = logging.getLogger(__name__)

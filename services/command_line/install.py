@@ -42,6 +42,7 @@ def install(
     apartment = load(file, None, {**os.environ, **unknown})
     plan = [] if there.is_file() else list(steps.copied(config.parent))
     plan += steps.files(apartment, Path(sys.executable))
+    plan += [steps.ACCOUNTS]
     if systemd:
         for step in plan:
             steps.do(step, root)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -36,12 +37,17 @@ def find(
     marker: int,
     robot: Robot = None,
     timeout_s: Annotated[float, typer.Option("--timeout", help="Seconds to wait for the end.")] = 1800.0,
+    plot: Annotated[Path | None, typer.Option(help="Draw what happened into this PNG file.")] = None,
     config: Config = CONFIG,
     json: Json = False,
 ) -> None:
     """Find a marker and tell each step; exit 1 when it was not found."""
     with _robot(config, robot) as (bus, name):
-        result = _found(bus, name, marker, timeout_s, (lambda _: None) if json else out.print)
+        say: Tell = (lambda _: None) if json else out.print
+        if plot is None:
+            result = _found(bus, name, marker, timeout_s, say)
+        else:
+            result = _drawn(bus, config, plot, lambda: _found(bus, name, marker, timeout_s, say), (name, marker))
     out.print_json(result.model_dump_json()) if json else out.print(f"{result.state}: {result.reason}")
     if result.state != "found":
         raise typer.Exit(1)
@@ -102,6 +108,19 @@ def _found(bus: Client, robot: str, marker: int, timeout_s: float, tell: Tell) -
 
     end = bus.until(ended, timeout_s, f"the end of mission {order.id}")
     result: MissionResult = read(end, end.received).payload
+    return result
+
+
+def _drawn(
+    bus: Client, config: Path, file: Path, find: Callable[[], MissionResult], what: tuple[str, int]
+) -> MissionResult:
+    """The mission, and a picture of it."""
+    from services.command_line import mission_plot  # maps and pictures, for who wants one
+
+    bus.subscribe(*mission_plot.FILTERS)
+    told = mission_plot.Timeline(*what, time.time())
+    result = find()
+    mission_plot.write(file, load(config, ("mission",)), told, bus.seen)
     return result
 
 

@@ -9,6 +9,7 @@ import os
 import time
 from contextlib import closing
 from dataclasses import asdict
+from datetime import tzinfo
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -40,8 +41,10 @@ def add_to(app: typer.Typer) -> None:
 
 
 def history(
-    item: Annotated[str, typer.Argument(help="An item; needless for --what changes.")] = "",
-    what: Annotated[str, typer.Option(help="samples, last, changes or durations (time in each state).")] = "samples",
+    item: Annotated[str, typer.Argument(help="An item; needless for --what changes or missions.")] = "",
+    what: Annotated[
+        str, typer.Option(help="samples, last, changes, durations (time in each state) or missions.")
+    ] = "samples",
     since: Annotated[str, typer.Option(help="A time, or how long ago: 90m, 24h, 7d.")] = "",
     until: Annotated[str, typer.Option(help="The same; now when not given.")] = "",
     every: Annotated[str, typer.Option(help="Count, least, mean, greatest per 5m, 1h, 1d.")] = "",
@@ -57,6 +60,9 @@ def history(
     apartment = load(config, ("persistence",))
     address, zone, now = _settings(apartment).address, apartment.home.zone, time.time()
     begin, end = command.moment(since, now, zone), command.moment(until, now, zone)
+    if what == "missions":
+        _missions(command.missions(address, begin, end, limit), zone, json=json, as_csv=as_csv)
+        return
     asked = _question(item, what, begin, end, command.every_s(every), limit)
     if plot is not None:
         plot.write_text(command.as_plot(address, asked, zone), encoding="utf-8")
@@ -70,6 +76,20 @@ def history(
     else:
         _say("\n".join(command.table(reply, zone)))
     if command.is_empty(reply):
+        raise typer.Exit(1)
+
+
+def _missions(found: list[dict[str, object]], zone: tzinfo, *, json: bool, as_csv: bool) -> None:
+    from services.history import command
+
+    rows = [tuple(found[0]), *(tuple(map(str, one.values())) for one in found)] if found else []
+    if json:
+        _say(dumps(found, ensure_ascii=False))
+    elif as_csv:
+        _say(command.comma_separated(rows).rstrip("\n"))
+    elif rows:
+        _say("\n".join(command.aligned(rows, zone)))
+    if not found:
         raise typer.Exit(1)
 
 

@@ -11,15 +11,15 @@ import json
 import math
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing
 from datetime import datetime, tzinfo
 
 from services.errors import BadMessage, ConfigError
 from services.history import answers
 from services.history.plot import Curve, svg
-from services.payloads import HistoryGet, HistoryReply, stamp
-from services.storage import Address, Item, Storage, open_storage, reading
+from services.payloads import HistoryGet, HistoryReply, seconds, stamp
+from services.storage import Address, Item, Mission, Storage, open_storage, reading
 
 UNITS_S = {"s": 1, "m": 60, "h": 3600, "d": 86_400, "w": 604_800}
 POINTS = 1000  # of a plot
@@ -67,6 +67,23 @@ def ask(address: Address, asked: HistoryGet) -> HistoryReply:
     return reply
 
 
+def missions(address: Address, since: str | None, until: str | None, limit: int) -> list[dict[str, object]]:
+    """The newest missions that began in a span, oldest first: what, how it ended, where, how long in seconds."""
+    begin = round(seconds(since) * US) if since else US
+    end = round((seconds(until) if until else time.time()) * US)
+    with closing(open_storage(address)) as storage:
+        return [_told(one) for one in reading.missions(storage, begin, end, limit)]
+
+
+def _told(one: Mission) -> dict[str, object]:
+    at = " ".join(f"{part:.2f}" for part in (one.x, one.y, one.z) if part is not None)
+    took = "" if one.ended is None else f"{(one.ended - one.started) / US:.1f}"
+    return {
+        "time": stamp(one.started / US), "robot": one.robot, "marker": one.marker, "state": one.state,
+        "seconds": took, "place": one.place or "", "position": at, "reason": one.reason or "", "mission": one.mission,
+    }  # fmt: skip
+
+
 def is_empty(reply: HistoryReply) -> bool:
     """Whether nothing was found."""
     return not (reply.samples or reply.durations)
@@ -92,9 +109,15 @@ def rows(reply: HistoryReply) -> Iterator[tuple[str, ...]]:
 
 def table(reply: HistoryReply, zone: tzinfo) -> Iterator[str]:
     """The answer as aligned lines, times on the home's clock; nothing where nothing was found."""
-    lines = [tuple(_local(cell, zone) for cell in row) for row in rows(reply)]
+    if not is_empty(reply):
+        yield from aligned(rows(reply), zone)
+
+
+def aligned(texts: Iterable[tuple[str, ...]], zone: tzinfo) -> Iterator[str]:
+    """Rows of text as lines with columns, times on the home's clock."""
+    lines = [tuple(_local(cell, zone) for cell in row) for row in texts]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    for line in lines if not is_empty(reply) else []:
+    for line in lines:
         yield "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
 
 
@@ -106,8 +129,13 @@ def _local(cell: str, zone: tzinfo) -> str:
 
 def as_csv(reply: HistoryReply) -> str:
     """With a line of names; times in UTC."""
+    return comma_separated(rows(reply))
+
+
+def comma_separated(texts: Iterable[tuple[str, ...]]) -> str:
+    """Rows of text as comma-separated values."""
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows(reply))
+    csv.writer(text, lineterminator="\n").writerows(texts)
     return text.getvalue()
 
 

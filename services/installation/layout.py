@@ -16,6 +16,7 @@ GROUP = "apartment"
 SYSTEM = secret_store.SYSTEM
 STATE = Path("/var/lib/apartment")
 BROKER = SYSTEM / "broker"
+DATABASE = SYSTEM / "database"
 UNITS = Path("/etc/systemd/system")
 TARGET = "apartment.target"
 

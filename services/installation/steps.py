@@ -6,6 +6,7 @@ Below another `root` than `/` everything is written and nothing is run: for an i
 from __future__ import annotations
 
 import os
+import pwd
 import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
@@ -18,7 +19,7 @@ from services.config import Apartment
 from services.credentials.folder import Folder, fill
 from services.errors import ApartmentError, ConfigError
 from services.installation import units
-from services.installation.layout import BROKER, STATE, SYSTEM, TARGET, UNITS, parts
+from services.installation.layout import BROKER, DATABASE, GROUP, STATE, SYSTEM, TARGET, UNITS, parts
 
 SECRETS = SYSTEM / "secrets"
 BROKER_FILES = ("passwords", "acl", "server.crt", "server.key")
@@ -68,10 +69,12 @@ def files(apartment: Apartment, python: Path) -> list[Step]:
     ]
 
 
+ACCOUNTS = Step(command=("systemd-sysusers",))  # before files are given to them
+
+
 def commands() -> list[Step]:
     """What makes systemd know them."""
     wanted = (
-        ("systemd-sysusers",),
         ("systemd-tmpfiles", "--create", "apartment.conf"),
         ("systemctl", "daemon-reload"),
         ("systemctl", "enable", TARGET, "apartment-renew.timer"),
@@ -88,8 +91,22 @@ def secrets(config: Path, hosts: Sequence[str], root: Path) -> Iterator[Step | s
         text = (folder.path / "broker" / name).read_text(encoding="utf-8")
         yield Step(BROKER / name, text, 0o600, "mosquitto")
     yield Step(BROKER / "mosquitto.conf", access.broker_conf(BROKER, Path("/var/lib/mosquitto")), 0o600, "mosquitto")
-    authority = folder.authority.read_text(encoding="ascii")
-    yield Step(SYSTEM / "ca.crt", authority)
+    if root != Path("/") or _is_user("mysql"):
+        yield from _database(folder)
+    yield Step(SYSTEM / "ca.crt", folder.authority.read_text(encoding="ascii"))
+    if (dashboard := folder.pair("dashboard")) is not None:
+        yield Step(SYSTEM / "dashboard.crt", dashboard.certificate)
+        yield Step(SYSTEM / "dashboard.key", dashboard.key, 0o640, f":{GROUP}")
+
+
+def _database(folder: Folder) -> Iterator[Step]:
+    for name in ("server.crt", "server.key"):
+        yield Step(DATABASE / name, (folder.path / "database" / name).read_text(encoding="ascii"), 0o600, "mysql")
+    yield Step(Path("/etc/mysql/mariadb.conf.d/60-apartment.cnf"), units.database())
+
+
+def _is_user(name: str) -> bool:
+    return any(one.pw_name == name for one in pwd.getpwall())
 
 
 def do(step: Step, root: Path) -> None:
@@ -100,12 +117,18 @@ def do(step: Step, root: Path) -> None:
         return
     file = root / step.path.relative_to("/")
     file.parent.mkdir(parents=True, exist_ok=True)
-    if step.path.is_relative_to(BROKER):
+    if step.path.parent in (BROKER, DATABASE):
         file.parent.chmod(0o700)
     access.write_private(file, step.text)
     if step.owner and root == Path("/") and os.geteuid() == 0:
-        for path in (file.parent, file):
-            shutil.chown(path, step.owner)
+        user, _, group = step.owner.partition(":")
+        if user and not _is_user(user):
+            raise NotDone(f"no user {user}: apt-get install {user}")
+        for path in (file.parent, file) if user else (file,):
+            if user:
+                shutil.chown(path, user)
+            if group:
+                shutil.chown(path, group=group)
     file.chmod(step.mode)
 
 

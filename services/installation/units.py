@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from services.installation.layout import BROKER, GROUP, STATE, SYSTEM, TARGET, Part
+from services.installation.layout import BROKER, DATABASE, GROUP, STATE, SYSTEM, TARGET, Part
 
 # The most memory (MB) that a service may take before it is ended and started again; twice what it was seen to need.
 MEMORY = {"camera": 1200, "simulated-camera": 800, "bridge": 500, "dashboard": 300}
@@ -103,7 +103,7 @@ WantedBy=multi-user.target
 
 def renewal(python: Path, secrets: Path) -> dict[str, str]:
     """Certificates are renewed long before they end; those who use them read them again."""
-    broker = BROKER / "server"
+    broker, page = BROKER / "server", SYSTEM / "dashboard"
     return {
         "apartment-renew.service": f"""\
 [Unit]
@@ -114,9 +114,14 @@ Type=oneshot
 ExecStart={python} -m services secrets renew --within 60 --out {secrets}
 ExecStart=/usr/bin/install -o mosquitto -m 0600 {secrets}/broker/server.key {broker}.key
 ExecStart=/usr/bin/install -o mosquitto -m 0600 {secrets}/broker/server.crt {broker}.crt
+ExecStart=-/usr/bin/install -o mysql -m 0600 {secrets}/database/server.key {DATABASE}/server.key
+ExecStart=-/usr/bin/install -o mysql -m 0600 {secrets}/database/server.crt {DATABASE}/server.crt
+ExecStart=/usr/bin/install -g {GROUP} -m 0640 {secrets}/dashboard/server.key {page}.key
+ExecStart=/usr/bin/install -m 0644 {secrets}/dashboard/server.crt {page}.crt
 ExecStart=-/usr/bin/systemctl --no-block reload-or-restart mosquitto.service
+ExecStart=-/usr/bin/systemctl --no-block try-restart apartment-dashboard.service
 UMask=0077
-ReadWritePaths={secrets} {BROKER}
+ReadWritePaths={secrets} {SYSTEM}
 CapabilityBoundingSet=CAP_CHOWN CAP_FOWNER CAP_DAC_OVERRIDE
 {"".join(line for line in HARDENED.splitlines(keepends=True) if "Capabilit" not in line and "~" not in line)}\
 RestrictAddressFamilies=AF_UNIX
@@ -151,6 +156,18 @@ ExecReload=/bin/kill -HUP $MAINPID
 Restart=always
 RestartSec=2
 MemoryMax=400M
+"""
+
+
+def database() -> str:
+    """MariaDB's own file: encrypted for other machines, and a commit is on the disk before it is answered."""
+    return f"""\
+# Written by `apartment install`. For other machines: bind-address = 0.0.0.0, and `apartment db grant NAME --host ...`.
+[mariadb]
+ssl_cert = {DATABASE / "server.crt"}
+ssl_key = {DATABASE / "server.key"}
+innodb_flush_log_at_trx_commit = 1
+character_set_server = utf8mb4
 """
 
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from services.floor import XY, Grid
 
 DISTANCES_M = (0.5, 0.7, 0.9, 1.2, 1.5, 1.9, 2.3)  # to the marker that are tried
-BEST_M, NEAREST_M = 1.2, 0.8  # as a rule; a print that lies high is looked at from nearer
+BEST_M, NEAREST_M = 1.2, 0.8  # as a rule; nearer to a print that lies high, and where there is no other place
 BEARINGS = 24  # directions round it that are tried
 APART_M = 0.6  # stands nearer to each other than this show the same
 OBLIQUE = radians(60)  # farther from the marker's face it is hard to read
 SLANT, STEEP = radians(50), radians(65)  # from above, to a print that lies: to be had at best, and at most
-TOO_FLAT = 3.0  # metres of distance that a stand beyond the latter costs
+TOO_FLAT, TOO_NEAR = 3.0, 1.5  # metres of distance that a stand beyond these costs
 WAY_COST = 0.15  # a metre of way more is worth so many metres of distance to the marker
 
 
@@ -56,10 +56,9 @@ class View:
         return cls(above_m * tan(SLANT), above_m * tan(STEEP))
 
     def cost(self, distance: float) -> float:
-        """What a distance is worse than the best, metres; infinite where it is nearer than anybody stands."""
-        if distance < min(NEAREST_M, self.best_m):
-            return inf
-        return abs(distance - self.best_m) + (TOO_FLAT if distance > self.farthest_m else 0.0)
+        """What a distance is worse than the best, metres."""
+        near = TOO_NEAR if distance < min(NEAREST_M, self.best_m) else 0.0
+        return abs(distance - self.best_m) + (TOO_FLAT if distance > self.farthest_m else near)
 
 
 ANY = View()
@@ -83,7 +82,7 @@ def stands(
 
 def _possible(grid: Grid, robot: Body, target: XY, facing_deg: float | None, view: View) -> list[tuple[float, Pose]]:
     possible = []
-    for distance in (one for one in DISTANCES_M if view.cost(one) < inf):
+    for distance in DISTANCES_M:
         for bearing in np.arange(BEARINGS) * 2 * pi / BEARINGS:
             aside = 0.0 if facing_deg is None else _between(bearing, radians(facing_deg))
             x, y = float(target[0] + distance * cos(bearing)), float(target[1] + distance * sin(bearing))

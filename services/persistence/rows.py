@@ -14,9 +14,19 @@ from services import states
 from services.errors import BadMessage
 from services.home import Home
 from services.payloads import Diagnostic, OrderResult, ScanResult, ScanState, seconds
-from services.storage import CameraOrder, Row, Sample, Scan, Sighting
+from services.robot_payloads import MissionResult, MissionState
+from services.storage import CameraOrder, Mission, Row, Sample, Scan, Sighting
 from services.storage import Diagnostic as DiagnosticRow
-from services.topics import CAMERA_ORDER_RESULT, CAMERA_SCAN_RESULT, CAMERA_SCAN_STATE, DIAGNOSTICS, HOME_STATE, Read
+from services.topics import (
+    CAMERA_ORDER_RESULT,
+    CAMERA_SCAN_RESULT,
+    CAMERA_SCAN_STATE,
+    DIAGNOSTICS,
+    HOME_STATE,
+    MISSION_RESULT,
+    MISSION_STATE,
+    Read,
+)  # fmt: skip
 
 UNKNOWN_KIND = "String"  # of an item that the home's model does not have
 AS_NUMBER = ("Number", "Dimmer", "Rollershutter")  # kinds whose value is the number alone; the others keep their text
@@ -83,11 +93,9 @@ def state_text(stored: Sample, unit: str | None) -> str:
 def _sighting(known: Read, _time: int) -> Sighting:
     seen: ScanResult = known.payload
     at, turned = seen.position, seen.orientation
-    if seen.marker not in MARKERS:
-        raise BadMessage(f"marker: expected 32 bits, got {seen.marker}")
     sx, sy, sz = _deviations(seen.covariance)
     return Sighting(
-        scan=_name(seen.scan, 64, "scan"), camera=_name(seen.camera, 64, "camera"), marker=seen.marker,
+        scan=_name(seen.scan, 64, "scan"), camera=_name(seen.camera, 64, "camera"), marker=_marker(seen.marker),
         dictionary=_name(seen.dictionary, 40, "dictionary"), place=_cut(seen.place, 100),
         stamp=_time_of(seen.stamp), first_seen=_time_of(seen.first_seen),
         x=at.x if at else None, y=at.y if at else None, z=at.z if at else None,
@@ -128,6 +136,35 @@ def _order(known: Read, time: int) -> CameraOrder:
     )  # fmt: skip
 
 
+def _mission(known: Read, _time: int) -> Mission | None:
+    """A mission under way; of a robot without one there is nothing to keep."""
+    told: MissionState = known.payload
+    if told.id is None or told.marker is None or told.state == "idle":
+        return None
+    started = _within(_time_of(told.since) - told.elapsed_s * 1e6, "elapsed_s")
+    return Mission(
+        mission=_name(told.id, 64, "id"), robot=_name(known.levels["robot"], 64, "robot"), marker=_marker(told.marker),
+        state=told.state, reason=_cut(told.reason, 400), place=_cut(told.place, 200) if told.place else None,
+        x=None, y=None, z=None, seen_by=None, started=started, ended=None, story=None,
+    )  # fmt: skip
+
+
+def _mission_end(known: Read, _time: int) -> Mission | None:
+    told: MissionResult = known.payload
+    if not told.id:
+        return None
+    at, ended = told.position, _time_of(told.stamp)
+    story = [[one.at_s, one.state, one.text] for one in told.story]
+    return Mission(
+        mission=_name(told.id, 64, "id"), robot=_name(known.levels["robot"], 64, "robot"), marker=_marker(told.marker),
+        state=told.state, reason=_cut(told.reason, 400), place=_cut(told.place, 200) if told.place else None,
+        x=at.x if at else None, y=at.y if at else None, z=at.z if at else None,
+        seen_by=_name(told.by, 64, "by") if told.by else None,
+        started=_within(ended - told.elapsed_s * 1e6, "elapsed_s"), ended=ended,
+        story=json.dumps(story, ensure_ascii=False) if story else None,
+    )  # fmt: skip
+
+
 def _diagnostic(known: Read, time: int) -> DiagnosticRow:
     told: Diagnostic = known.payload
     details = {"hardware_id": told.hardware_id, "values": told.values}
@@ -141,6 +178,8 @@ READERS: dict[str, Callable[[Read, int], Row | None]] = {
     CAMERA_SCAN_STATE.pattern: _scan,
     CAMERA_ORDER_RESULT.pattern: _order,
     DIAGNOSTICS.pattern: _diagnostic,
+    MISSION_STATE.pattern: _mission,
+    MISSION_RESULT.pattern: _mission_end,
 }
 
 
@@ -155,7 +194,16 @@ def _name(text: str, limit: int, what: str) -> str:
 
 
 def _time_of(text: str) -> int:
-    return _within(seconds(text) * 1e6, "time")
+    try:
+        return _within(seconds(text) * 1e6, "time")
+    except ValueError as error:
+        raise BadMessage(f"time: expected one like 2026-01-31T07:05:00Z, got {text[:40]!r}") from error
+
+
+def _marker(number: int) -> int:
+    if number not in MARKERS:
+        raise BadMessage(f"marker: expected 32 bits, got {number}")
+    return number
 
 
 def _within(microseconds: float, what: str) -> int:

@@ -1,4 +1,4 @@
-"""Where samples, sightings, scans, orders and diagnostics are kept: one small contract, two databases behind it.
+"""Where samples, sightings, scans, orders, missions, diagnostics are kept: a small contract, two databases behind it.
 
 Not here: which value is worth keeping (`services/persistence/`), and the SQL (`mysql.py`, `sqlite.py`; the tables
 are in `schema/`, one file per version). All times are whole microseconds since 1970, UTC.
@@ -15,8 +15,8 @@ from typing import Any, Protocol
 from services.storage.address import Address, read_address
 
 __all__ = [
-    "Address", "Batch", "CameraOrder", "Diagnostic", "Item", "Row", "Sample", "Scan", "SeenTurn", "Sighting", "Storage",
-    "open_plain", "open_storage", "read_address",
+    "Address", "Batch", "CameraOrder", "Diagnostic", "Item", "Mission", "Row", "Sample", "Scan", "SeenTurn", "Sighting",
+    "Storage", "open_plain", "open_storage", "read_address",
 ]  # fmt: skip
 BACKENDS = {"mysql": "services.storage.mysql", "sqlite": "services.storage.sqlite"}
 
@@ -98,6 +98,28 @@ class CameraOrder:
 
 
 @dataclass(frozen=True, slots=True)
+class Mission:
+    """A mission; written at each of its states, and left alone once it has ended. Fields are the columns.
+
+    Position in the apartment, metres; `story` is JSON: [[seconds since it began, step, text], ...].
+    """
+
+    mission: str
+    robot: str
+    marker: int
+    state: str
+    reason: str | None
+    place: str | None
+    x: float | None
+    y: float | None
+    z: float | None
+    seen_by: str | None
+    started: int
+    ended: int | None
+    story: str | None
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnostic:
     """A change of a component's level or message; `details` is JSON. Fields are the columns."""
 
@@ -118,11 +140,12 @@ class SeenTurn:
     packets: bytes
 
 
-Row = Sighting | Scan | CameraOrder | Diagnostic
+Row = Sighting | Scan | CameraOrder | Mission | Diagnostic
 TABLES: dict[type[Row], str] = {
     Sighting: "sighting",
     Scan: "scan",
     CameraOrder: "camera_order",
+    Mission: "mission",
     Diagnostic: "diagnostic",
 }
 TIMES = frozenset({"time", "stamp", "first_seen", "started", "ended", "at"})  # the columns that hold a time

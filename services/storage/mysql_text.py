@@ -26,6 +26,7 @@ VIEW_VALUES = {  # of a kind; all others show their text
 }
 _FINAL = f"state IN {FINAL_STATES}"
 _OPEN_SCAN = ("state", "found", "frames_taken", "frames_analysed")
+_OPEN_MISSION = ("state", "reason", "x", "y", "z", "seen_by", "story")
 DUPLICATE = {  # MariaDB assigns from left to right, so the column that decides comes last
     "sample": "num=num",
     "sighting": "marker=marker",
@@ -33,6 +34,8 @@ DUPLICATE = {  # MariaDB assigns from left to right, so the column that decides 
     "camera_order": f"error=IF({_FINAL},error,VALUES(error)), state=IF({_FINAL},state,VALUES(state))",
     "scan": ", ".join(f"{name}=IF(ended IS NULL,VALUES({name}),{name})" for name in _OPEN_SCAN)
     + ", ended=COALESCE(ended,VALUES(ended))",
+    "mission": ", ".join(f"{name}=IF(ended IS NULL,VALUES({name}),{name})" for name in _OPEN_MISSION)
+    + ", place=IF(ended IS NULL,COALESCE(VALUES(place),place),place), ended=COALESCE(ended,VALUES(ended))",
 }
 COLUMNS = {table: tuple(field.name for field in fields(row)) for row, table in TABLES.items()}
 SEEN = "client, slot, turn, packets"

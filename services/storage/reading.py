@@ -7,9 +7,9 @@ The SQL for both databases, from whole numbers only. All times are microseconds 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
-from services.storage import Item, Sample, Storage
+from services.storage import TIMES, Item, Mission, Sample, Storage
 from services.storage.mysql_text import MICROSECONDS, moment
 
 SECOND = 1_000_000
@@ -133,6 +133,18 @@ def durations(storage: Storage, item: Item, since: int, until: int) -> dict[str,
         f"AND s.time>={sql.at(start)} AND s.time<{sql.at(until)}) r) d GROUP BY v"
     )
     return {_plain(value): int(spent) for value, spent in rows}
+
+
+def missions(storage: Storage, since: int, until: int, limit: int) -> list[Mission]:
+    """The newest missions that began in a span, oldest first."""
+    sql = DIALECTS[storage.dialect]
+    names = [one.name for one in fields(Mission)]
+    columns = ", ".join(sql.micro.format(name) if name in TIMES else name for name in names)
+    rows = storage.read(
+        f"SELECT {columns} FROM mission WHERE started>={sql.at(max(since, SECOND))} AND started<{sql.at(until)} "
+        f"ORDER BY started DESC LIMIT {int(limit)}"
+    )
+    return [Mission(*row) for row in reversed(rows)]
 
 
 def _plain(value: object) -> str:

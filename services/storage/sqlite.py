@@ -39,6 +39,9 @@ CONFLICT = {
     "camera_order": f"DO UPDATE SET error=excluded.error, state=excluded.state WHERE state NOT IN {FINAL_STATES}",
     "scan": "DO UPDATE SET state=excluded.state, found=excluded.found, frames_taken=excluded.frames_taken, "
     "frames_analysed=excluded.frames_analysed, ended=excluded.ended WHERE ended IS NULL",
+    "mission": "DO UPDATE SET state=excluded.state, reason=excluded.reason, place=COALESCE(excluded.place, place), "
+    "x=excluded.x, y=excluded.y, z=excluded.z, seen_by=excluded.seen_by, story=excluded.story, ended=excluded.ended "
+    "WHERE ended IS NULL",
 }
 SAMPLE = "SELECT i.name, s.time, s.num, s.text FROM item i"
 # Without the word CROSS the planner reads every sample: 400 times slower.
@@ -165,7 +168,7 @@ class SqliteStorage:
 
     def quote(self, text: str) -> str:
         """See `Storage`."""
-        return "'" + text.replace("'", "''") + "'"
+        return "'" + text.replace("'", "''").replace("\0", "'||char(0)||'") + "'"
 
     def remake_views(self) -> None:
         """See `Storage`."""

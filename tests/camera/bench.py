@@ -74,11 +74,11 @@ class Bench:
         return found
 
     def truth(self) -> dict[str, Any]:
-        state: dict[str, Any] = httpx.get(f"{self.camera.side_door_url}/state").json()
+        state: dict[str, Any] = httpx.get(f"{self.camera.side_door_url}/state", timeout=30).json()
         return state
 
     def tell(self, path: str, **content: object) -> None:
-        httpx.post(f"{self.camera.side_door_url}/{path}", json=content).raise_for_status()
+        httpx.post(f"{self.camera.side_door_url}/{path}", json=content, timeout=30).raise_for_status()
 
 
 def settings(camera: simulated.Simulated, folder: Path, world: World, **changes: Any) -> real.Config:

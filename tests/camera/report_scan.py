@@ -43,7 +43,7 @@ class ReportScan:
     def run(self) -> None:
         """Both turns."""
         self._began = time.monotonic()
-        with httpx.Client(base_url=self.url, auth=httpx.DigestAuth(self.user, self.password)) as http:
+        with httpx.Client(base_url=self.url, auth=httpx.DigestAuth(self.user, self.password), timeout=30) as http:
             with ThreadPoolExecutor(1) as detection:
                 for look in LOOKS.values():
                     self._mode(http, *look)

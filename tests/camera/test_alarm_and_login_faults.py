@@ -46,7 +46,7 @@ def door(here: Bench) -> dict[str, int]:
 
 
 def log(here: Bench) -> list[dict[str, Any]]:
-    entries: list[dict[str, Any]] = httpx.get(f"{here.camera.side_door_url}/log").json()
+    entries: list[dict[str, Any]] = httpx.get(f"{here.camera.side_door_url}/log", timeout=30).json()
     return entries
 
 
@@ -107,7 +107,7 @@ def test_a_slow_camera_stays_usable_and_its_latency_is_told(here: Bench) -> None
 
 
 def test_a_clock_that_is_wrong_is_set(tmp_path: Path, camera: simulated.Simulated) -> None:
-    httpx.post(f"{camera.side_door_url}/fault", json={"name": "clock", "seconds": 3600}).raise_for_status()
+    httpx.post(f"{camera.side_door_url}/fault", json={"name": "clock", "seconds": 3600}, timeout=30).raise_for_status()
     with bench(tmp_path, camera) as here:
         here.until(lambda: "time_drift_s" in here.service.bulletin.facts.values, 15)
         written = [entry["target"] for entry in log(here) if "setCurrentTime" in entry["target"]]

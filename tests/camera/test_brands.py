@@ -91,11 +91,11 @@ def reading(driver: Camera) -> Reading:
 
 
 def tell(camera: simulated.Simulated, path: str, **content: object) -> None:
-    httpx.post(f"{camera.side_door_url}/{path}", json=content).raise_for_status()
+    httpx.post(f"{camera.side_door_url}/{path}", json=content, timeout=30).raise_for_status()
 
 
 def state(camera: simulated.Simulated) -> dict[str, Any]:
-    answer: dict[str, Any] = httpx.get(f"{camera.side_door_url}/state").json()
+    answer: dict[str, Any] = httpx.get(f"{camera.side_door_url}/state", timeout=30).json()
     return answer
 
 

@@ -249,9 +249,32 @@ def test_whatever_the_order_of_tries_and_answers_no_more_than_three_fail(steps: 
             flying.append(urgent)
         for _ in range(min(answers, len(flying))):
             book.failed(0.0, sure=False)
-            book.back(urgent=flying.pop())
+            book.back(urgent=flying.pop(), answered=True)
             failed += 1
     assert failed + len(flying) <= 3
+
+
+def test_logins_without_an_answer_count_as_one_that_failed_because_the_camera_locks_after_five() -> None:
+    book = Book()
+    for _ in range(2):
+        book.tries(urgent=True)
+    for _ in range(2):
+        book.back(urgent=True, answered=False)
+    for _ in range(2):
+        assert book.closed(0.0) is None
+        assert book.may_try(urgent=True)
+        book.tries(urgent=True)
+        book.failed(0.0, sure=False)
+        book.back(urgent=True, answered=True)
+    assert isinstance(book.closed(0.0), BadLogin)
+
+
+def test_a_login_that_passes_settles_those_without_an_answer() -> None:
+    book = Book()
+    book.tries(urgent=True)
+    book.back(urgent=True, answered=False)
+    book.passed(book.tries(urgent=True), 0.0)
+    assert not book.unanswered
 
 
 def test_an_answer_from_before_a_refusal_does_not_open_the_way_for_more() -> None:

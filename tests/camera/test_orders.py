@@ -335,7 +335,7 @@ def a_file(here: Here) -> None:
 
 
 def is_played(here: Here) -> None:
-    played = httpx.get(f"{here.door.url}/played").json()
+    played = httpx.get(f"{here.door.url}/played", timeout=30).json()
     assert played[-1]["seconds"] == pytest.approx(0.5, abs=0.05)
 
 

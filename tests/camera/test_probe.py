@@ -57,7 +57,7 @@ class Quiet:
 
     def move(self) -> None:
         for action in ("Start", "Stop"):
-            httpx.post(f"{self.camera.side_door_url}/event", json={"code": "VideoMotion", "action": action})
+            httpx.post(f"{self.camera.side_door_url}/event", json={"code": "VideoMotion", "action": action}, timeout=30)
 
     def detail(self, text: str) -> None:
         pass
@@ -88,8 +88,8 @@ def meet(profile: str, may_move: bool) -> Meeting:
             found = contact(wire, Quiet(camera), lambda found: may_move)
         finally:
             wire.close()
-        state = httpx.get(f"{camera.side_door_url}/state").json()
-        asked = [entry["target"] for entry in httpx.get(f"{camera.side_door_url}/log").json()]
+        state = httpx.get(f"{camera.side_door_url}/state", timeout=30).json()
+        asked = [entry["target"] for entry in httpx.get(f"{camera.side_door_url}/log", timeout=30).json()]
         files = dict(paper.recorded(found, wire))
         return Meeting(found, files, state, asked, camera.server.device.tables.changes)
 
@@ -175,7 +175,7 @@ def test_a_wrong_password_is_tried_once() -> None:
         with pytest.raises(BadLogin, match="no more will be"):
             contact(wire, Quiet(camera), lambda found: True)
         wire.close()
-        assert httpx.get(f"{camera.side_door_url}/state").json()["door"]["wrong"] == 1
+        assert httpx.get(f"{camera.side_door_url}/state", timeout=30).json()["door"]["wrong"] == 1
 
 
 def test_nobody_there_is_told_at_once() -> None:

@@ -58,9 +58,9 @@ def test_what_is_played_arrives_at_the_loudspeaker(here: Bench, tmp_path: Path) 
     (tmp_path / "audio").mkdir()
     (tmp_path / "audio" / "doorbell.wav").write_bytes(wav.write(wav.to_samples(sweep), 44100))
     assert done(here, "AudioPlay", "doorbell.wav")["state"] == "done"
-    (played,) = httpx.get(f"{here.camera.side_door_url}/played").json()
+    (played,) = httpx.get(f"{here.camera.side_door_url}/played", timeout=30).json()
     assert abs(played["seconds"] - 1.5) < 0.01
-    heard, rate = wav.read(httpx.get(f"{here.camera.side_door_url}/played.wav").content)
+    heard, rate = wav.read(httpx.get(f"{here.camera.side_door_url}/played.wav", timeout=30).content)
     wanted = wav.resampled(sweep, 44100)
     assert rate == g711.RATE
     assert len(heard) == len(wanted)
@@ -86,8 +86,8 @@ def test_privacy_is_switched_where_there_is_one_and_refused_elsewhere(here: Benc
 
 
 def test_a_clock_that_is_wrong_is_set_and_the_card_is_told(tmp_path: Path, camera: simulated.Simulated) -> None:
-    httpx.post(f"{camera.side_door_url}/clock", json={"offset_s": -5000}).raise_for_status()
-    httpx.post(f"{camera.side_door_url}/card", json={"in": True}).raise_for_status()
+    httpx.post(f"{camera.side_door_url}/clock", json={"offset_s": -5000}, timeout=30).raise_for_status()
+    httpx.post(f"{camera.side_door_url}/card", json={"in": True}, timeout=30).raise_for_status()
     with bench(tmp_path, camera) as here:
         facts = here.service.bulletin.facts
         here.until(lambda: {"time_drift_s", "storage"} <= set(facts.values), WAIT_S)

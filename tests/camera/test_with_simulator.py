@@ -43,7 +43,7 @@ def eventually(happened: Callable[[], bool], limit_s: float) -> None:
 
 
 def state(camera: simulated.Simulated) -> dict[str, Any]:
-    answer: dict[str, Any] = httpx.get(f"{camera.side_door_url}/state").json()
+    answer: dict[str, Any] = httpx.get(f"{camera.side_door_url}/state", timeout=30).json()
     return answer
 
 

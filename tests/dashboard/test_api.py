@@ -98,7 +98,7 @@ def test_a_login_makes_a_new_session_that_no_script_can_read(guarded: Running) -
         assert person.get("/api/session").json()["role"] == "operator"
         person.login("ann")
         assert person.http.cookies["apartment"] != first
-        with httpx.Client(base_url=guarded.url, cookies={"apartment": first}, trust_env=False) as old:
+        with httpx.Client(base_url=guarded.url, cookies={"apartment": first}, trust_env=False, timeout=30) as old:
             assert old.get("/api/apartment").status_code == 401
 
 
@@ -106,7 +106,7 @@ def test_logging_out_ends_the_session(guarded: Running) -> None:
     with guarded.browser("ann") as person:
         token = person.http.cookies["apartment"]
         assert person.post("/api/logout").status_code == 200
-        with httpx.Client(base_url=guarded.url, cookies={"apartment": token}, trust_env=False) as again:
+        with httpx.Client(base_url=guarded.url, cookies={"apartment": token}, trust_env=False, timeout=30) as again:
             assert again.get("/api/apartment").status_code == 401
 
 
@@ -151,13 +151,13 @@ def test_a_form_cannot_log_in(guarded: Running) -> None:
      ("evil.example", False), ("evil.example:8088", False), ("", False), ("127.0.0.1.evil.example", False)],
 )  # fmt: skip
 def test_only_our_own_names_are_answered(guarded: Running, host: str, known: bool) -> None:
-    answer = httpx.get(f"{guarded.url}/api/session", headers={"Host": host}, trust_env=False)
+    answer = httpx.get(f"{guarded.url}/api/session", headers={"Host": host}, trust_env=False, timeout=30)
     assert answer.status_code == (200 if known else 403)
 
 
 @pytest.mark.parametrize("path", ["/", "/main.js", "/api/session", "/nothing", "/../settings.py", "/api/live"])
 def test_every_answer_carries_the_strict_headers(guarded: Running, path: str) -> None:
-    headers = httpx.get(f"{guarded.url}{path}", trust_env=False).headers
+    headers = httpx.get(f"{guarded.url}{path}", trust_env=False, timeout=30).headers
     policy = headers["content-security-policy"]
     assert "default-src 'none'" in policy
     assert "frame-ancestors 'none'" in policy

@@ -17,7 +17,7 @@ from services.errors import ConfigError
 from services.history import command
 from services.history.plot import Curve, svg
 from services.payloads import seconds
-from services.storage import Batch, Item, Sample, open_storage
+from services.storage import Batch, Item, Mission, Sample, open_storage
 
 MADRID = ZoneInfo("Europe/Madrid")
 HOUR_US = 3_600_000_000
@@ -54,6 +54,28 @@ def test_the_newest_samples_as_a_table(site: Path) -> None:
     assert lines[0].split(maxsplit=1) == ["time", "state [°C]"]
     assert [float(line.split()[-1]) for line in lines[1:]] == [20.03, 20.02, 20.01]
     assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3}\+0[12]:00 ", lines[1])
+
+
+def test_the_missions_that_were_and_the_one_that_goes_on(site: Path) -> None:
+    assert run(site, "--what", "missions", code=1) == ""
+    storage = open_storage("sqlite:///bus.db", site.parent)
+    began = round(time.time() * 1e6) - HOUR_US
+    found = Mission(
+        "m1", "tiago", 582, "found", "seen", "Sofa", 1.0, 2.0, 0.5, "tiago", began, began + 41_500_000, "[]"
+    )
+    goes = Mission("m2", "tiago", 17, "go", "to Hall", "Hall", None, None, None, None, began + HOUR_US // 2, None, None)
+    storage.write(Batch(rows=[found, goes]))
+    storage.close()
+    head, first, second = run(site, "--what", "missions").splitlines()
+    assert head.split() == ["time", "robot", "marker", "state", "seconds", "place", "position", "reason", "mission"]
+    assert re.search(r"tiago +582 +found +41\.5 +Sofa +1\.00 2\.00 0\.50 +seen +m1$", first)
+    assert re.search(r"tiago +17 +go +Hall +to Hall +m2$", second)
+    assert (
+        run(site, "--what", "missions", "--csv", "--limit", "1")
+        .splitlines()[1]
+        .endswith(",tiago,17,go,,Hall,,to Hall,m2")
+    )
+    assert [one["mission"] for one in json.loads(run(site, "--what", "missions", "--json", "--since", "45m"))] == ["m2"]
 
 
 def test_means_as_comma_separated_values(site: Path) -> None:

@@ -49,7 +49,7 @@ def needs(name: str, package: str) -> str:
 
 def test_there_is_a_unit_for_every_service_with_its_own_user_and_its_own_secrets_only(machine: Path) -> None:
     named = {unit.stem.removeprefix("apartment-"): unit.read_text() for unit in units(machine)}
-    assert set(named) == {"persistence", "history", "camera-ip1", "bridge", "mission", "hubs", "renew"}
+    assert set(named) == {"persistence", "history", "camera-ip1", "bridge", "mission", "hubs", "dashboard", "renew"}
     secrets = {name: set(re.findall(r"LoadCredential=(\w+):", text)) for name, text in named.items()}
     assert secrets["camera-ip1"] == {"BUS_CAMERA_IP1_PASSWORD", "CAMERA_IP1_PASSWORD"}
     assert secrets["persistence"] == {"BUS_PERSISTENCE_PASSWORD", "DATABASE_PASSWORD"}
@@ -89,7 +89,7 @@ def test_systemd_finds_no_unit_more_exposed_than_3_of_10(machine: Path) -> None:
 
 
 def test_what_is_secret_is_for_its_owner_only(machine: Path) -> None:
-    for folder in ("etc/apartment/secrets", "etc/apartment/broker"):
+    for folder in ("etc/apartment/secrets", "etc/apartment/broker", "etc/apartment/database"):
         for path in (machine / folder, *(machine / folder).rglob("*")):
             assert path.stat().st_mode & 0o077 == 0, path
     texts = [path.read_text() for path in (machine / "etc/systemd").rglob("*") if path.is_file()]
@@ -112,7 +112,7 @@ def test_installing_again_keeps_what_people_changed(machine: Path) -> None:
     assert install("--systemd", "--root", str(machine)).returncode == 0
     assert config.read_text().endswith("# mine\n")
     assert (machine / "etc/apartment/secrets/secrets.yaml").read_text() == before
-    assert len(units(machine)) == 7
+    assert len(units(machine)) == 8
 
 
 def test_a_dry_run_shows_the_steps_and_does_nothing(tmp_path: Path) -> None:

@@ -39,6 +39,7 @@ LYING = ("counter", "table", "cupboard", "bed")  # kinds that it can lie on
 HIGHEST_M = 0.95  # of what it lies on: the robot looks down from 1.1 m
 AWAY_M = 0.75  # of things that stand about, from the named points
 LONGEST_S = 1800.0
+SMALL = {f"Encode[0].MainFormat[0].Video.{side}": str(pixels) for side, pixels in (("Width", 1152), ("Height", 648))}
 UNWANTED = ("persistence", "history", "bridge")  # they take part in no mission
 
 
@@ -184,17 +185,22 @@ def configured(flat: Flat, folder: Path, *, house: bool = True) -> Path:
 
 
 @contextmanager
-def virtual(flat: Flat, *, house: bool) -> Iterator[VirtualApartment]:
+def virtual(flat: Flat, *, house: bool, small: bool) -> Iterator[VirtualApartment]:
     """The flat in virtual time."""
     with tempfile.TemporaryDirectory() as name:
         config = configured(flat, Path(name), house=house)
         with VirtualApartment(config, {"APARTMENT_STATE": f"{name}/state"}) as apartment:
+            if small and house:
+                apartment.insides["ip1"].device.tables.write(list(SMALL.items()))
             yield apartment
 
 
-def mission(flat: Flat, *, house: bool) -> Run:
-    """The mission in virtual time, with the house's camera or without; AssertionError when it has no end."""
-    with virtual(flat, house=house) as apartment:
+def mission(flat: Flat, *, house: bool, small: bool = False) -> Run:
+    """The mission in virtual time, with the house's camera or without; AssertionError when it has no end.
+
+    `small`: with small pictures of the camera, which take less time to draw and show less.
+    """
+    with virtual(flat, house=house, small=small) as apartment:
         apartment.client.say(MISSION_ORDER.name(robot="tiago"), json.dumps({"find": TARGET, "id": "m"}))
         ends: list[MissionResult] = []
         sighted = False

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from services import floor, robot_places
 from services.errors import ConfigError
 from services.floor import FREE, OCCUPIED, UNKNOWN, Grid
-from services.mission.standing import Pose, body, stands
+from services.mission.standing import ANY, Pose, View, body, stands
 from services.simulators.robot import plan
 from services.simulators.world import load
 
@@ -44,25 +44,76 @@ pieces = st.tuples(st.floats(0.2, 5.0), st.floats(0.2, 5.0), st.floats(0.1, 1.5)
 spots = st.tuples(st.floats(-0.5, 4.5), st.floats(-1.5, 3.5))
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.lists(pieces, max_size=6), spots, spots, st.none() | st.floats(-180, 180))
+@st.composite
+def maps(draw: st.DrawFn) -> Grid:
+    """A room with walls round it, things in it, perhaps a wall across it that has a door, and corners unknown."""
+    grid = room(draw(st.lists(pieces, max_size=6)), resolution=draw(st.sampled_from([0.05, 0.1])))
+    per_m = round(1 / grid.resolution)
+    if (row := draw(st.none() | st.integers(2, 4))) is not None:
+        door = round(draw(st.floats(0.2, 4.8)) * per_m)
+        kept = grid.cells[row * per_m, door : door + per_m].copy()
+        grid.cells[row * per_m] = OCCUPIED
+        grid.cells[row * per_m, door : door + per_m] = kept
+    for x, y, width, height in draw(st.lists(pieces, max_size=2)):
+        left, low, right, high = (round(value * per_m) for value in (x, y, x + width, y + height))
+        grid.cells[low:high, left:right] = UNKNOWN
+    return grid
+
+
+@settings(max_examples=60, deadline=None)
+@given(maps(), st.floats(0.15, 0.4), spots, spots, st.none() | st.floats(-180, 180), st.none() | st.floats(0.05, 1.0))
 def test_every_stand_keeps_the_robots_radius_faces_the_marker_and_can_be_driven_to(
-    boxes: list[tuple[float, float, float, float]],
+    grid: Grid,
+    radius: float,
     target: tuple[float, float],
     start: tuple[float, float],
     facing: float | None,
+    above: float | None,
 ) -> None:
-    grid = room(boxes)
-    robot = body(grid, RADIUS, start)
-    for pose in stands(grid, robot, target, facing):
-        assert gap(grid, pose) >= RADIUS
+    robot = body(grid, radius, start)
+    view = ANY if above is None else View.down(above)
+    for pose in stands(grid, robot, target, facing, view):
+        assert gap(grid, pose) >= radius
         bearing = degrees(atan2(target[1] - pose.y, target[0] - pose.x))
         assert abs((bearing - pose.yaw_deg + 180) % 360 - 180) < 10
         assert robot.reach[grid.cell(pose.x, pose.y)]
-        assert 0.8 < hypot(target[0] - pose.x, target[1] - pose.y) < 2.5
+        assert 0.4 < hypot(target[0] - pose.x, target[1] - pose.y) < 2.5
         if facing is not None:
             seen_from = degrees(atan2(pose.y - target[1], pose.x - target[0]))
             assert abs((seen_from - facing + 180) % 360 - 180) <= 60.01
+
+
+def test_nearly_every_random_map_has_a_stand() -> None:
+    rng = np.random.default_rng(1)
+    count = 0
+    for _ in range(40):
+        boxes = [(*rng.uniform(0.2, 5.0, 2), *rng.uniform(0.1, 1.5, 2)) for _ in range(rng.integers(6))]
+        grid = room(boxes)
+        free = [grid.point(*cell) for cell in np.argwhere(grid.clearance >= RADIUS)]
+        start, target = (free[int(index)] for index in rng.integers(len(free), size=2))
+        count += bool(stands(grid, body(grid, RADIUS, start), target))
+    assert count >= 36
+
+
+def test_a_print_on_a_table_is_looked_at_from_nearer_than_one_on_the_floor() -> None:
+    grid = room([])
+    robot = body(grid, RADIUS, (2.0, -1.0))
+
+    def far(view: View) -> float:
+        best = stands(grid, robot, (2.0, 1.0), None, view)[0]
+        return hypot(best.x - 2.0, best.y - 1.0)
+
+    assert far(View.down(0.36)) == pytest.approx(0.5)
+    assert far(View.down(0.58)) == pytest.approx(0.7)
+    assert far(View.down(1.09)) == far(ANY) == pytest.approx(1.2)
+
+
+def test_there_is_a_stand_in_a_narrow_aisle_where_no_better_one_is() -> None:
+    grid = room([(0.05, 3.0, 5.9, 0.5), (0.05, 1.5, 5.9, 0.7)])
+    robot = body(grid, RADIUS, (2.0, 0.6))
+    found = stands(grid, robot, (2.0, 0.98), facing_deg=-90)
+    assert found
+    assert all(hypot(one.x - 2.0, one.y - 0.98) < 1.0 for one in found)
 
 
 @settings(max_examples=20, deadline=None)

@@ -14,9 +14,19 @@ from services.errors import BadMessage
 from services.home import Home, Item
 from services.payloads import Diagnostic, OrderResult, Point, Quaternion, ScanResult, ScanState
 from services.persistence import rows
-from services.storage import CameraOrder, Sample, Scan, Sighting
+from services.robot_payloads import MissionEvent, MissionResult, MissionState
+from services.storage import CameraOrder, Mission, Sample, Scan, Sighting
 from services.storage import Diagnostic as DiagnosticRow
-from services.topics import CAMERA_ORDER_RESULT, CAMERA_SCAN_RESULT, CAMERA_SCAN_STATE, DIAGNOSTICS, HOME_STATE, read
+from services.topics import (
+    CAMERA_ORDER_RESULT,
+    CAMERA_SCAN_RESULT,
+    CAMERA_SCAN_STATE,
+    DIAGNOSTICS,
+    HOME_STATE,
+    MISSION_RESULT,
+    MISSION_STATE,
+    read,
+)  # fmt: skip
 
 T = 1_769_839_200_000_000  # 2026-01-31 06:00 UTC
 SEEN = ScanResult(
@@ -180,6 +190,42 @@ def test_an_order_keeps_its_value_as_text() -> None:
     assert row_of(CAMERA_ORDER_RESULT.message(order, cam="ip1")) == CameraOrder(
         "o1", "ip1", "Scan", '{"targets": [582]}', "refused", "no such place", T
     )
+
+
+def test_a_mission_began_its_elapsed_time_before_its_step_and_ends_with_its_story() -> None:
+    since = "1970-01-01T00:01:00.000Z"
+    going = MissionState(state="go", id="m1", marker=582, place="Sofa", reason="to Sofa", since=since, elapsed_s=20.0)
+    assert row_of(MISSION_STATE.message(going, robot="tiago")) == Mission(
+        "m1", "tiago", 582, "go", "to Sofa", "Sofa", None, None, None, None, 40_000_000, None, None
+    )
+    event = MissionEvent(at_s=1.5, state="go", text="to the Küche")
+    done = MissionResult(id="m1", marker=582, state="found", reason="seen", place="Sofa", by="tiago", elapsed_s=30.0,
+                         position=Point(x=1, y=2, z=0.5), story=[event], stamp="1970-01-01T00:01:10.000Z")  # fmt: skip
+    assert row_of(MISSION_RESULT.message(done, robot="tiago")) == Mission(
+        "m1", "tiago", 582, "found", "seen", "Sofa", 1.0, 2.0, 0.5, "tiago", 40_000_000, 70_000_000,
+        '[[1.5, "go", "to the Küche"]]',
+    )  # fmt: skip
+
+
+def test_a_robot_without_a_mission_makes_none() -> None:
+    idle = MissionState(state="idle", since="1970-01-01T00:01:00.000Z")
+    assert row_of(MISSION_STATE.message(idle, robot="tiago")) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"since": "yesterday"}, "time: expected one like"),
+        ({"since": "2026-01-31T07:05:00"}, "time: expected one like"),
+        ({"elapsed_s": 1e300}, "elapsed_s: expected a time from 1970"),
+        ({"marker": 2**40}, "marker: expected 32 bits"),
+        ({"id": "x" * 65}, "id: expected at most 64 characters"),
+    ],
+)
+def test_a_mission_that_no_table_holds_is_refused(change: dict[str, object], why: str) -> None:
+    going = MissionState(state="go", id="m1", marker=582, since="2026-01-31T07:05:00.000Z")
+    with pytest.raises(BadMessage, match=why):
+        row_of(MISSION_STATE.message(going.model_copy(update=change), robot="tiago"))
 
 
 def test_a_diagnostic_keeps_its_values_as_json() -> None:

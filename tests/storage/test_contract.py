@@ -15,11 +15,13 @@ from services.storage import (
     CameraOrder,
     Diagnostic,
     Item,
+    Mission,
     Sample,
     Scan,
     Sighting,
     Storage,
     open_storage,
+    reading,
 )
 from tests.databases import Database
 
@@ -65,6 +67,7 @@ def test_writing_a_batch_again_changes_nothing(storage: Storage, database: Datab
             Sighting("s1", "ip1", 582, "DICT_5X5_1000", "Kitchen", T0, x=1.0),
             Scan("s1", "ip1", "done", "582", "582", T0, T0 + MINUTE, 8, 8),
             CameraOrder("o1", "ip1", "Goto", "Kitchen", "done", None, T0),
+            Mission("m1", "tiago", 582, "found", "", "Sofa", 1.0, 2.0, 0.5, "tiago", T0, T0 + MINUTE, "[]"),
             Diagnostic("camera/ip1", T0, 0, "fine", None),
         ],
     )
@@ -72,12 +75,12 @@ def test_writing_a_batch_again_changes_nothing(storage: Storage, database: Datab
     before = content(database)
     storage.write(batch)
     assert content(database) == before
-    assert [len(rows) for rows in before] == [2, 1, 1, 1, 1]
+    assert [len(rows) for rows in before] == [2, 1, 1, 1, 1, 1]
 
 
 def content(database: Database) -> list[list[object]]:
     """Every row of the tables that batches go to."""
-    tables = ("sample", "sighting", "scan", "camera_order", "diagnostic")
+    tables = ("sample", "sighting", "scan", "camera_order", "mission", "diagnostic")
     return [list(database.rows(f"SELECT * FROM {table} ORDER BY 1, 2")) for table in tables]
 
 
@@ -143,6 +146,25 @@ def test_an_order_ends_in_the_states_in_which_it_ends_on_the_bus() -> None:
     assert FINAL_STATES == FINAL
 
 
+def test_a_mission_follows_its_states_until_it_has_ended(storage: Storage) -> None:
+    going = Mission("m1", "tiago", 582, "go", "to Sofa", "Sofa", None, None, None, None, T0, None, None)
+    found = replace(going, state="found", reason="seen", x=1.5, y=2.0, z=0.5, seen_by="tiago", ended=T0 + MINUTE)
+    storage.write(Batch(rows=[replace(going, state="look", place=None), replace(going, started=T0 + 7)]))
+    assert reading.missions(storage, 0, T0 + MINUTE, 9) == [going]
+    storage.write(Batch(rows=[replace(going, state="scan", place=None)]))
+    assert reading.missions(storage, 0, T0 + MINUTE, 9) == [replace(going, state="scan")]
+    storage.write(Batch(rows=[replace(found, story='[[0, "go", "to Sofa"]]')]))
+    storage.write(Batch(rows=[going, replace(found, state="failed", place="Hall", ended=T0 + 2 * MINUTE)]))
+    assert reading.missions(storage, 0, T0 + MINUTE, 9) == [replace(found, story='[[0, "go", "to Sofa"]]')]
+
+
+def test_the_newest_missions_of_a_span_are_told_oldest_first(storage: Storage) -> None:
+    one = Mission("m0", "tiago", 1, "found", None, None, None, None, None, None, T0, T0, None)
+    storage.write(Batch(rows=[replace(one, mission=f"m{n}", started=T0 + n * MINUTE) for n in range(5)]))
+    told = reading.missions(storage, T0 + MINUTE, T0 + 4 * MINUTE, 2)
+    assert [mission.mission for mission in told] == ["m2", "m3"]
+
+
 def test_an_order_keeps_its_first_time_and_its_final_state(storage: Storage, database: Database) -> None:
     order = CameraOrder("o1", "ip1", "Goto", "Kitchen", "accepted", None, T0)
     failed = replace(order, state="failed", error="no such place", at=T0 + MINUTE)
@@ -205,7 +227,7 @@ def test_what_was_written_is_there_for_the_next_who_opens(storage: Storage, data
     again = open_storage(database.address)
     assert again.last("Lab_Temp") == Sample("Lab_Temp", T0, 21.5, None)
     assert again.items["Lab_Temp"].unit == "°C"
-    assert database.rows("SELECT MAX(version) FROM schema_version") == [(2,)]
+    assert database.rows("SELECT MAX(version) FROM schema_version") == [(3,)]
     again.close()
 
 

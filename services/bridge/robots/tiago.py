@@ -34,14 +34,18 @@ if TYPE_CHECKING:
 EVERY_S = 0.1  # between two looks at what the senses say
 WELL_S = 5.0  # poses and pictures that are older are a fault
 OK, WARN, ERROR = 0, 1, 2
+DICTIONARY = (  # OpenCV's names
+    r"^DICT_((4X4|5X5|6X6|7X7)_(50|100|250|1000)|ARUCO_ORIGINAL|ARUCO_MIP_36[hH]12"
+    r"|APRILTAG_(16[hH]5|25[hH]9|36[hH]1[01]))$"
+)
 Name = Annotated[str, Field(pattern=r"^/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*$")]
 
 
 class Markers(Section):
     """How large the printed black squares are, metres: `size`, and `sizes` of those that are not so."""
 
-    size: float = Field(default=0.14, gt=0)
-    sizes: dict[int, float] = {}
+    size: float = Field(default=0.14, gt=0, le=2)
+    sizes: dict[int, Annotated[float, Field(gt=0, le=2)]] = {}
 
 
 class Settings(Section):
@@ -57,7 +61,7 @@ class Settings(Section):
     image: Name | None = "/xtion/rgb/image_raw/compressed"  # what our own detector looks at
     camera_info: Name | None = "/xtion/rgb/camera_info"
     fiducials: Name | None = None  # of aruco_detect, such as /fiducial_transforms; instead of image
-    dictionary: str = "DICT_5X5_1000"
+    dictionary: str = Field(default="DICT_5X5_1000", pattern=DICTIONARY)
     markers: Markers = Markers()
     look_every_s: float = Field(default=0.5, ge=0.1, le=10)
     pose_every_s: float = Field(default=0.25, ge=0.05, le=10)

@@ -39,6 +39,7 @@ class Book:
     retry_s: float = RETRY_S
     failures: int = 0  # in a row
     ever: int = 0  # failures since the beginning
+    unanswered: bool = False  # a login since the last that passed: the camera may have counted it as a failure
     flying: int = 0  # logins whose outcome is not known yet
     others: int = 0  # of these, the ones that are not urgent
     closings: int = 0  # in a row
@@ -63,7 +64,7 @@ class Book:
 
         What is urgent waits only for the last of the tries; the rest goes one by one, and alone after a failure.
         """
-        if self.failures + self.flying >= MOST_FAILURES:
+        if self._counted + self.flying >= MOST_FAILURES:
             return self.flying == 0
         return urgent or (self.others == 0 and (self.failures == 0 or self.flying == 0))
 
@@ -73,9 +74,15 @@ class Book:
         self.others += not urgent
         return self.ever
 
-    def back(self, *, urgent: bool) -> None:
+    @property
+    def _counted(self) -> int:
+        """Failures in a row as the camera may see them."""
+        return self.failures + self.unanswered
+
+    def back(self, *, urgent: bool, answered: bool) -> None:
         """It is not on its way any more."""
         self.flying -= 1
+        self.unanswered = self.unanswered or not answered
         self.others -= not urgent
 
     def passed(self, number: int, now: float) -> None:
@@ -84,6 +91,7 @@ class Book:
             if self.failures and self.why != "locked":
                 self.odd_until = now + ODD_WINDOW_S
             self.failures, self.closings, self.why, self.opens_at = 0, 0, "", None
+            self.unanswered = False
 
     def failed(self, now: float, *, sure: bool) -> None:
         """A login was refused; `sure`: it was a repeat with a new challenge, some time after the first."""
@@ -94,7 +102,7 @@ class Book:
                 self.close(now, "wrong")
             elif self.failures >= MOST_FAILURES:
                 self._shut(now, 2.0 ** (self.failures - MOST_FAILURES), "odd")
-        elif sure or self.failures >= MOST_FAILURES:
+        elif sure or self._counted >= MOST_FAILURES:
             self.close(now, "wrong")
 
     def close(self, now: float, why: Literal["wrong", "locked"]) -> None:
@@ -190,11 +198,13 @@ class Gate:
                 raise Away("other logins to this camera have no answer yet")
             number = self.book.tries(urgent=urgent)
             doubted = self.book.failures > 0
+        answered = False
         try:
             yield Try(self, number, doubted=doubted)
+            answered = True
         finally:
             with self.changed:
-                self.book.back(urgent=urgent)
+                self.book.back(urgent=urgent, answered=answered)
                 self.changed.notify_all()
 
     def _open(self, urgent: bool) -> bool:

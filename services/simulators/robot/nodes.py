@@ -26,6 +26,7 @@ from services.vision.frames import Transform, quaternion, rotation_z
 
 NODE = "simulated_robot"
 POLL_S = 0.5  # of the master
+LEAVE_S = 1.0  # a master that hangs must not hold up our end
 STEP_S = 0.05  # of its motion and its frames
 AMCL_M, AMCL_DEG = 0.05, 5.0  # of motion between two poses of amcl
 CONTROL_S = 0.1  # of move_base
@@ -62,11 +63,11 @@ class Nodes:
         """Leaves the ROS graph."""
         self._stopping.set()
         for thread in self._threads:
-            thread.join(2.0)
+            thread.join(LEAVE_S)
         rospy = ros_node.rospy()
         leaving = threading.Thread(target=rospy.signal_shutdown, args=("the robot is switched off",), daemon=True)
         leaving.start()
-        leaving.join(2.0)
+        leaving.join(LEAVE_S)
 
     # Threads.
 

@@ -113,7 +113,7 @@ def test_it_drives_looks_and_says_what_became_of_it(flat: Any) -> None:
     seen = next(text for _, topic, text in bridge.said[since:] if topic == SEEN and '"marker":582' in text)
     (marker,) = [one for one in json.loads(seen)["markers"] if one["marker"] == 582]
     world = load(ROOT / "config" / "world.yaml")
-    truth = world.map.apartment_to_map.transform.apply(world.marker_pose(582).translation)
+    truth = world.map.apartment_to_map.transform.apply(world.marker(582).pose.translation)
     error = [marker["position"][axis] - truth[index] for index, axis in enumerate("xyz")]
     assert hypot(*error) < 0.10, "within what its belief of its own place allows"
 

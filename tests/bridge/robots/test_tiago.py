@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from math import cos, radians, sin
 from typing import Any
 
@@ -13,13 +14,14 @@ from services.bridge import Config
 from services.bridge.program import check
 from services.bridge.robots import kinds
 from services.bridge.robots.goals import AGAIN_S, FORGOTTEN_S, SILENT_S, TAKEN_S
-from services.bridge.robots.tiago import Settings, Tiago
+from services.bridge.robots.tiago import DICTIONARY, Settings, Tiago
 from services.bridge.rules import read
 from services.bridge.service import Bridge
 from services.bridge.simulated import SimulatedNode
 from services.bus import LOST_TOPIC, Message
 from services.errors import ConfigError
 from services.robot_places import PointPose, RobotPlaces
+from services.vision.codes import DICTIONARIES
 from tests.bridge.test_service import CONFIG, HOME, NOW
 
 PENDING, ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = range(6)
@@ -240,6 +242,12 @@ def test_faults_in_a_robots_section_are_told_where_they_stand(robots: Any, place
     (fault,) = raised.value.errors()
     assert fault["loc"] == place
     assert text in fault["msg"]
+
+
+def test_the_dictionaries_are_opencvs() -> None:
+    assert [name for name in DICTIONARIES if not re.fullmatch(DICTIONARY, name)] == []
+    with pytest.raises(ValidationError):
+        Settings(dictionary="DICT_5X5_999")
 
 
 def test_the_file_of_its_points_is_read_at_the_check() -> None:

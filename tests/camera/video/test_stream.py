@@ -97,7 +97,7 @@ def test_the_stream_is_switched_on_seen_and_switched_off(here: Bench, key: str) 
     assert here.end_of("2", 5)["state"] == "done"
     here.turn()
     assert stream(here)[key.lower()] is False
-    assert httpx.get(url).status_code == 503
+    assert httpx.get(url, timeout=30).status_code == 503
     here.until(lambda: diagnostic(here)["values"]["stream"] == "off", 5)
 
 
@@ -177,7 +177,10 @@ def test_without_rtsp_the_cameras_mjpeg_is_handed_on_where_that_is_allowed(
 def test_a_stream_that_gives_no_picture_fails_the_order_and_stays_off(
     tmp_path: Path, camera: simulated.Simulated
 ) -> None:
-    with bench(tmp_path, camera, rtsp_port=free_port()) as here, httpx.Client(base_url=camera.side_door_url) as side:
+    with (
+        bench(tmp_path, camera, rtsp_port=free_port()) as here,
+        httpx.Client(base_url=camera.side_door_url, timeout=30) as side,
+    ):
         side.post("/fail", json={"n": 100000, "how": "text"}).raise_for_status()
         here.order("RTSP", "ON", "1")
         ended = here.end_of("1", 40)

@@ -89,7 +89,7 @@ def test_the_microphone_as_a_multipart(client: httpx.Client) -> None:
 @pytest.mark.parametrize("method", ["GET", "POST"])
 def test_channel_0_is_refused_for_ever_as_if_the_nonce_were_old(camera: Simulated, method: str) -> None:
     target = (LISTEN.format("singlepart", 0) if method == "GET" else SPEAK.format(0)).encode()
-    with httpx.Client(auth=httpx.DigestAuth("ros", "secret123")) as client:
+    with httpx.Client(auth=httpx.DigestAuth("ros", "secret123"), timeout=30) as client:
         answers = [client.request(method, camera.url + target.decode()) for _ in range(2)]
     assert [answer.status_code for answer in answers] == [401, 401]
     assert 'stale="true"' in answers[0].headers["www-authenticate"]
@@ -98,7 +98,7 @@ def test_channel_0_is_refused_for_ever_as_if_the_nonce_were_old(camera: Simulate
 def _authorization(camera: Simulated, target: str) -> str:
     """The header of a POST that is sent without being asked for it, after a small request."""
     auth = httpx.DigestAuth("ros", "secret123")
-    with httpx.Client(base_url=camera.url) as client:
+    with httpx.Client(base_url=camera.url, timeout=30) as client:
         client.get("/cgi-bin/devAudioOutput.cgi?action=getCollect", auth=auth)
         flow = auth.auth_flow(httpx.Request("POST", camera.url + target))
         return next(flow).headers["Authorization"]

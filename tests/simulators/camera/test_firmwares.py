@@ -60,7 +60,7 @@ def test_every_firmware_lets_an_independent_client_in(config: Config, name: str)
 
 def test_the_newest_firmware_wants_sha_256(config: Config) -> None:
     with _running(config, "sd2a-2023") as (camera, client):
-        first = httpx.get(camera.url + STATUS).headers["www-authenticate"]
+        first = httpx.get(camera.url + STATUS, timeout=30).headers["www-authenticate"]
         assert "algorithm=SHA-256" in first
         assert 'qop="auth,auth-int"' in first
         assert len(said_in(first)["realm"]) == len("Login to ") + 32
@@ -92,7 +92,7 @@ def test_a_realm_names_the_camera_in_its_firmwares_way(form: Any, expected: str)
 
 def test_header_names_may_be_in_capitals(config: Config) -> None:
     with _running(config, header_case="upper") as (camera, client):
-        refused = httpx.get(camera.url + STATUS)
+        refused = httpx.get(camera.url + STATUS, timeout=30)
         assert {b"WWW-AUTHENTICATE", b"CONNECTION", b"CONTENT-LENGTH"} == {name for name, _ in refused.headers.raw}
         assert {name for name, _ in client.get(STATUS).headers.raw} == {
             b"CONNECTION",

@@ -95,9 +95,9 @@ def test_good_logins_are_refused_at_random_and_cost_nothing(client: httpx.Client
 def test_another_password_is_needed_after_it_was_changed(camera: Simulated, door: httpx.Client) -> None:
     old, new = httpx.DigestAuth("ros", "secret123"), httpx.DigestAuth("ros", "other")
     with _fault(door, "password", password="other"):
-        assert httpx.get(camera.url + STATUS, auth=old).status_code == 401
-        assert httpx.get(camera.url + STATUS, auth=new).status_code == 200
-    assert httpx.get(camera.url + STATUS, auth=old).status_code == 200
+        assert httpx.get(camera.url + STATUS, auth=old, timeout=30).status_code == 401
+        assert httpx.get(camera.url + STATUS, auth=new, timeout=30).status_code == 200
+    assert httpx.get(camera.url + STATUS, auth=old, timeout=30).status_code == 200
 
 
 def test_a_locked_account_refuses_the_right_password(client: httpx.Client, door: httpx.Client) -> None:

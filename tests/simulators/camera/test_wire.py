@@ -166,7 +166,7 @@ def test_a_rebooting_camera_resets_connections(client: httpx.Client) -> None:
 
 
 def test_a_wrong_password_is_refused(camera: Simulated) -> None:
-    answer = httpx.get(camera.url + STATUS, auth=httpx.DigestAuth("ros", "wrong"))
+    answer = httpx.get(camera.url + STATUS, auth=httpx.DigestAuth("ros", "wrong"), timeout=30)
     assert answer.status_code == 401
 
 
@@ -180,7 +180,7 @@ def test_the_side_door_refuses_nonsense(door: httpx.Client, path: str, body: obj
 
 def test_control_requests_wait_their_turn(config: Config) -> None:
     slow = config.model_copy(update={"latency_s": 0.25})  # 0.15 at least
-    with start(slow) as camera, httpx.Client(auth=httpx.DigestAuth("ros", "secret123")) as client:
+    with start(slow) as camera, httpx.Client(auth=httpx.DigestAuth("ros", "secret123"), timeout=30) as client:
         client.get(camera.url + STATUS)
         began = camera.server.clock()
         threads = [threading.Thread(target=client.get, args=(camera.url + STATUS,)) for _ in range(3)]
@@ -194,7 +194,7 @@ def test_control_requests_wait_their_turn(config: Config) -> None:
 def test_a_ready_line_tells_the_ports(camera: Simulated) -> None:
     said = camera.addresses
     assert said["url"] == f"http://127.0.0.1:{said['port']}"
-    assert httpx.get(camera.side_door_url + "/state").json()["pose"]["tilt"] == 20.0
+    assert httpx.get(camera.side_door_url + "/state", timeout=30).json()["pose"]["tilt"] == 20.0
 
 
 def test_an_unknown_camera_is_a_configuration_error(config: Config) -> None:

@@ -1,0 +1,131 @@
+"""One file with everything that an apartment knows: configuration and places, what was learnt, what is stored.
+
+A ZIP archive: `manifest.json`, `config/...`, `state/...`, `database.jsonl`. Without passwords and certificates, which
+are in a folder of their own (`services/credentials/`). Not here: how rows become lines, `services/storage/dump.py`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Iterator
+from contextlib import closing
+from datetime import UTC, datetime
+from pathlib import Path, PurePosixPath
+
+from services import __version__
+from services.config import Apartment
+from services.errors import ConfigError
+from services.storage import Address, dump, open_storage, upkeep
+
+FORM = 1  # of the archive
+DATABASE = "database.jsonl"
+CONFIG, STATE = "config/", "state/"
+LARGEST = 1 << 30  # bytes of one file that is put back; a small archive may claim to hold a large one
+
+
+def save(file: Path, apartment: Apartment, database: Address | None) -> Iterator[str]:
+    """Writes the archive; whoever looks meanwhile sees no file, or the old one. Yields a line for each part."""
+    beside = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        with open(os.open(beside, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600), "w+b") as output:
+            with zipfile.ZipFile(output, "w", zipfile.ZIP_DEFLATED, strict_timestamps=False) as archive:
+                yield from _save_parts(archive, apartment, database)
+            output.flush()
+            os.fsync(output.fileno())
+        beside.replace(file)
+    finally:
+        beside.unlink(missing_ok=True)
+    yield f"{file}: {file.stat().st_size} bytes, without passwords"
+
+
+def _save_parts(archive: zipfile.ZipFile, apartment: Apartment, database: Address | None) -> Iterator[str]:
+    made = {"form": FORM, "version": __version__, "made": datetime.now(UTC).isoformat(), "config": apartment.file.name}
+    folders = ((CONFIG, apartment.file.parent), (STATE, apartment.state))
+    for begin, folder in folders:
+        files = _files(folder, () if begin == STATE else (apartment.state,), database)
+        for path in files:
+            archive.write(path, begin + path.relative_to(folder).as_posix())
+        yield f"{folder}: {len(files)} files"
+    if database is not None:
+        with closing(open_storage(database)) as storage:
+            made["schema"] = str(upkeep.version(storage))
+            with archive.open(DATABASE, "w", force_zip64=True) as lines:
+                count = sum(1 for line in dump.lines(storage) if lines.write(line.encode() + b"\n"))
+        yield f"{database}: {count} rows"
+    archive.writestr("manifest.json", json.dumps(made, indent=1))
+
+
+def _files(folder: Path, but: tuple[Path, ...], database: Address | None) -> list[Path]:
+    """What is kept of a folder: files of its own, neither the database's nor the secrets' nor what is half written."""
+    stored = database.path.name if database is not None and database.dialect == "sqlite" else None
+    found = []
+    for path in sorted(folder.rglob("*")) if folder.is_dir() else ():
+        inner = path.relative_to(folder)
+        hidden = any(part.startswith(".") for part in inner.parts)
+        secret = inner.parts[0] in ("secrets", "broker", "secrets.yaml")
+        if not path.is_file() or path.is_symlink() or hidden or secret or any(map(path.is_relative_to, but)):
+            continue
+        if stored is None or not path.name.startswith(stored):
+            found.append(path)
+    return found
+
+
+def manifest(file: Path) -> dict[str, str]:
+    """What an archive says of itself; ConfigError when it is none of ours, or of a newer program."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            told: dict[str, str] = json.loads(archive.read("manifest.json"))
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise ConfigError([f"{file}: expected a file that `apartment backup` wrote, got {error}"]) from error
+    if int(told.get("form", 0)) != FORM:
+        raise ConfigError([f"{file}: expected a backup of form {FORM}, got {told.get('form')}"])
+    return told
+
+
+def put_files_back(file: Path, begin: str, folder: Path, *, force: bool = False) -> Iterator[str]:
+    """Writes the files of a part; one that is there and says something else is a fault, or with `force` replaced."""
+    with zipfile.ZipFile(file) as archive:
+        wanted = [one for one in archive.infolist() if one.filename.startswith(begin) and not one.is_dir()]
+        targets = {one.filename: folder / _inside(one, begin) for one in wanted}
+        if not force:
+            other = [
+                path
+                for one in wanted
+                if (path := targets[one.filename]).exists() and path.read_bytes() != archive.read(one)
+            ]
+            if other:
+                raise ConfigError([f"{path}: expected no other file there: --force replaces it" for path in other])
+        for one in wanted:
+            path = targets[one.filename]
+            path.parent.mkdir(parents=True, exist_ok=True)
+            beside = path.with_name(f".{path.name}.{os.getpid()}")
+            beside.write_bytes(archive.read(one))
+            beside.replace(path)
+    yield f"{folder}: {len(wanted)} files"
+
+
+def _inside(one: zipfile.ZipInfo, begin: str) -> PurePosixPath:
+    """The path of a file in its folder; nothing leads out of it, and nothing is larger than anything of ours."""
+    path = PurePosixPath(one.filename.removeprefix(begin))
+    if path.is_absolute() or ".." in path.parts or "\\" in one.filename or not path.parts:
+        raise ConfigError([f"{one.filename!r}: expected a path inside of the backup"])
+    if one.file_size > LARGEST:
+        raise ConfigError([f"{one.filename!r}: expected at most {LARGEST} bytes, got {one.file_size}"])
+    return path
+
+
+def put_rows_back(file: Path, database: Address) -> Iterator[str]:
+    """Writes all rows into an empty database, which is made where it is missing; nothing where the backup has none."""
+    told = manifest(file)
+    with zipfile.ZipFile(file) as archive:
+        if DATABASE not in archive.namelist():
+            return
+        with closing(open_storage(database)) as storage, archive.open(DATABASE) as lines:
+            if int(told["schema"]) > (own := upkeep.version(storage)):
+                raise ConfigError([f"{file}: its schema has version {told['schema']}, this program knows {own}"])
+            counted = dump.put_back(storage, (line.decode() for line in lines))
+    with closing(open_storage(database)) as storage:  # it learns the items
+        storage.remake_views()
+    yield f"{database}: {sum(counted.values())} rows"
