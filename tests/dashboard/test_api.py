@@ -7,6 +7,7 @@ import socket
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx
@@ -14,11 +15,13 @@ import pytest
 from openapi_spec_validator import validate
 
 from services import peers, topics
+from services.config import BusSettings
 from services.dashboard.sessions import FREE_TRIES
 from services.dashboard.settings import Tls
 from services.payloads import HistoryReply, seconds
+from services.peers import mosquitto
 from tests.bus.test_tls import certificates
-from tests.dashboard.parts import PASSWORD, USERS, Running, running
+from tests.dashboard.parts import PASSWORD, USERS, Browser, Running, configured, running, service
 
 pytestmark = pytest.mark.mosquitto
 
@@ -379,3 +382,26 @@ def test_the_page_is_small() -> None:
     from services.dashboard.http.files import Files
 
     assert sum(len(file.packed) for file in Files()._files.values()) < 300_000
+
+
+def test_while_the_broker_is_away_nothing_is_ordered_and_afterwards_all_is_well(tmp_path: Path) -> None:
+    order = ("/api/items/Kitchen_Light/command", {"value": "ON"})
+    with ExitStack() as stack:
+        try:
+            broker = stack.enter_context(mosquitto.private(tmp_path / "mosquitto", anonymous=True))
+        except peers.Missing as missing:
+            pytest.skip(str(missing))
+        down = stack.pop_all()
+        settings = BusSettings(port=broker.port)
+        with service(configured(tmp_path, broker.port), settings, tmp_path) as url, Browser(url) as person:
+            try:
+                peers.wait_until(lambda: person.get("/api/broker").json()["online"], "the broker", 30.0)
+                assert person.post(*order).status_code == 202
+            finally:
+                down.close()
+            peers.wait_until(lambda: not person.get("/api/broker").json()["online"], "the end of the broker", 30.0)
+            answer = person.post(*order)
+            assert (answer.status_code, answer.json()) == (503, {"error": "the broker is away"})
+            with mosquitto.private(tmp_path / "mosquitto", port=broker.port, anonymous=True):
+                peers.wait_until(lambda: person.get("/api/broker").json()["online"], "the broker again", 30.0)
+                assert person.post(*order).status_code == 202
