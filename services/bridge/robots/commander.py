@@ -19,6 +19,11 @@ class Commander:
         self._mission: str | None = None
         self._since: float | None = None  # when the mission service was heard to have ended
 
+    @property
+    def wants(self) -> bool:
+        """Whether there is a mission."""
+        return self._mission is not None
+
     def orders(self, state: MissionState) -> None:
         """The robot's mission, as the mission service says."""
         self._mission = state.id

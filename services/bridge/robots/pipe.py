@@ -27,9 +27,13 @@ class Wanted:
 
 @dataclass(frozen=True)
 class UnderWay:
-    """The goal that is to be cancelled when the bridge is gone: its topic and name; None: there is none."""
+    """The goal that is to be cancelled when the bridge is gone: its topic and name; None: there is none.
+
+    `mission`: whether somebody waits for what the robot sees.
+    """
 
     goal: tuple[str, str] | None
+    mission: bool = False
 
 
 @dataclass(frozen=True)

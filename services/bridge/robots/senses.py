@@ -30,6 +30,7 @@ from services.robot_payloads import RobotPose, RobotSeen, SeenMarker
 from services.vision.frames import Transform
 
 TF, TF_STATIC = "/tf", "/tf_static"
+IDLE_S = 2.0  # between two looks while nobody waits for them
 OLD_S = 3.0  # of a picture or pose that is still worth telling
 FAREWELL_S = 1.0  # for a cancel to leave before we do
 TURN_S = 0.05
@@ -52,6 +53,7 @@ def run(wanted: Wanted, connection: Connection, every_s: float) -> None:
         while True:
             if connection.poll(TURN_S) and isinstance(told := connection.recv(), UnderWay):
                 goal = told.goal
+                senses.hurry(mission=told.mission)
             for said in senses.turn(time.monotonic(), time.time()):
                 connection.send(said)
             if time.monotonic() >= report_at:
@@ -103,6 +105,7 @@ class Senses:
         self._newest: dict[str, tuple[float, Fields]] = {}  # pictures and lenses: when they came, and what
         self._pose_due = self._look_due = 0.0
         self._pose_at = self._picture_at = -inf
+        self._look_every_s = max(IDLE_S, wanted.look_every_s)
         self.link, self.up, self.ended = "not yet", False, False
 
     def hear(self, message: Message) -> None:
@@ -120,6 +123,11 @@ class Senses:
             else:
                 self._newest[topic] = now, fields
 
+    def hurry(self, *, mission: bool) -> None:
+        """On a mission it looks as often as it is told to, else now and then."""
+        self._look_every_s = self._wanted.look_every_s if mission else max(IDLE_S, self._wanted.look_every_s)
+        self._look_due = 0.0
+
     def turn(self, now: float, wall: float) -> list[RobotPose | RobotSeen]:
         """What is to be told now: `now` of the monotonic clock, `wall` seconds since 1970."""
         said: list[RobotPose | RobotSeen] = []
@@ -127,7 +135,7 @@ class Senses:
             self._pose_due, self._pose_at = now + self._wanted.pose_every_s, now
             said.append(_pose(where, wall))
         if now >= self._look_due and (seen := self._look(now)) is not None:
-            self._look_due, self._picture_at = now + self._wanted.look_every_s, now
+            self._look_due, self._picture_at = now + self._look_every_s, now
             said.append(RobotSeen(markers=seen, stamp=stamp(wall)))
         return said
 

@@ -152,7 +152,7 @@ class Tiago(Part):
         self._kept = kept
         if (left := kept.read()) is not None:
             self._to_bus.append(self.goals.left(left))
-        self._told: tuple[str, str] | None = None  # the goal under way, as the senses know it
+        self._told: UnderWay | None = None  # the goal under way, as the senses know it
         self._felt: Felt | None = None
         self.due = self._feel_due = 0.0
 
@@ -192,9 +192,10 @@ class Tiago(Part):
             if self._commander.is_gone(goal.id, now):
                 self._take(self.goals.cancel(goal.id, "the mission service is gone, so that nobody follows the robot"))
         self._kept.write(self.goals.goal.id if self.goals.goal else None)
-        if self._child is not None and self.goals.under_way != self._told:
-            self._told = self.goals.under_way
-            self._child.tell(UnderWay(self._told))
+        under_way = UnderWay(self.goals.under_way, self._commander.wants)
+        if self._child is not None and under_way != self._told:
+            self._told = under_way
+            self._child.tell(under_way)
         for one in self._to_ros:
             node.publish(one.topic, one.fields)
         self._to_ros.clear()

@@ -158,6 +158,20 @@ def test_what_aruco_detect_says_is_taken_as_it_is_and_rubbish_is_not() -> None:
         assert sensing.seen() == []
 
 
+def test_without_a_mission_it_looks_now_and_then() -> None:
+    sensing = Sensing(fiducials=FIDUCIALS)
+    nothing = {"header": {"stamp": WALL, "frame_id": "eye"}, "transforms": []}
+    counts, base = [], time.monotonic()
+    for mission in (False, True):
+        sensing.senses.hurry(mission=mission)
+        looks = 0
+        for step in range(20):
+            sensing.says(FIDUCIALS, nothing)
+            looks += len(sensing.senses.turn(base + 0.13 * step, WALL))
+        counts.append(looks)
+    assert counts == [2, 5], "in two and a half seconds"
+
+
 def test_a_picture_that_is_old_is_not_told() -> None:
     sensing = Sensing(fiducials=FIDUCIALS)
     sensing.says(FIDUCIALS, {"header": {"stamp": WALL, "frame_id": "eye"}, "transforms": []})
