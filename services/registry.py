@@ -78,4 +78,5 @@ REGISTRY: tuple[Row, ...] = (
     Row("hubs", "services.hubs", ("hubs",), "tells Home Assistant and Homie what there is", group="light"),
     Row("mission", "services.mission", ("mission",), "robot and house find a marker together", group="light"),
     Row("dashboard", "services.dashboard", ("dashboard",), "shows and steers everything in a browser"),
+    Row("metrics", "services.metrics", ("metrics",), "tells Prometheus how the services fare", group="light"),
 )

@@ -125,10 +125,11 @@ class MissionResult(Payload):
 
 
 class Where(Payload):
-    """`mission/<robot>/where`: where was this marker last?"""
+    """`mission/<robot>/where`: where was this marker last? `refresh`: let the house look again if that is long ago."""
 
     marker: int = Field(ge=0, le=9999)
     id: str = Field(max_length=64, pattern=r"^[A-Za-z0-9_-]+$")
+    refresh: bool = True
 
 
 class Whereabouts(Payload):
@@ -143,8 +144,12 @@ class Whereabouts(Payload):
 
 
 class WhereReply(Payload):
-    """`mission/<robot>/where/reply/<id>`: newest first; none when nobody has seen it."""
+    """`mission/<robot>/where/reply/<id>`: newest first; none when nobody has seen it.
+
+    `refreshing`: the house looks again, and the same is answered once more when it has.
+    """
 
     id: str
     marker: int
     sightings: list[Whereabouts]
+    refreshing: bool = False

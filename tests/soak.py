@@ -23,6 +23,7 @@ from rich.table import Table
 from services.simulated import Simulated, parts_of, services_of
 from services.virtual import VirtualApartment
 from tests import trials
+from tests.attacks import flooding
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
 from tests.camera.scan.scenes import scan_a_scene
@@ -171,6 +172,7 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "flats": (lambda: nullcontext(flat_trials.a_flat), 20, "s, virtual"),
     "real-flats": (lambda: nullcontext(flat_trials.on_real_parts), 2, "x the virtual time"),
     "detector": (detector_trials.in_numbers, 100, "false markers in 50 frames"),
+    "flood": (flooding.floods, 5, "ms, the others' slowest of a hundred"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
 }
 

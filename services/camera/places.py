@@ -23,6 +23,7 @@ from services.payloads import Places as PlacesPayload
 POSITIONS = "preset_position.yaml"
 PRESETS = "preset_coords.yaml"
 LONGEST_NAME = 80
+MOST = 500  # places; each is told to everybody, again and again
 CONTROL = ("Cc", "Cs", "Zl", "Zp")  # control characters, halves of characters, and what breaks a line
 NEAR_DEG = 0.6  # a reading that near to a place is at that place
 NEAR_ZOOM = 0.5
@@ -66,6 +67,8 @@ class Places:
     def save(self, name: str, place: Place) -> None:
         """Keeps a place under this name, and writes the files; Refused when what stands there cannot be read."""
         with self._to_be_written():
+            if name not in self.named and len(self.named) >= MOST:
+                raise Refused(f"there are {MOST} places already: remove one")
             self._write({**self.named, name: place})
 
     def remove(self, name: str) -> None:

@@ -11,35 +11,39 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
+from services.command_line.options import CONFIG, Config, out
 from services.errors import ConfigError
 
-CONFIG = Path("config/apartment.yaml")
 PLACEHOLDER = "not yet known"  # for a secret that the check of a new configuration would miss
-out = Console(soft_wrap=True, highlight=False)
 
 
 def install(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only show what would be done.")] = False,
     systemd: Annotated[bool, typer.Option("--systemd", help="Do it.")] = False,
     host: Annotated[list[str] | None, typer.Option(help="A name of this machine, for its certificates.")] = None,
+    compose_file: Annotated[
+        Path | None, typer.Option("--compose", help="Write a compose file there, for containers.")
+    ] = None,
     root: Annotated[Path, typer.Option(help="Write below this folder instead, and run nothing.")] = Path("/"),
-    config: Annotated[Path, typer.Option("--config", help="The configuration file.")] = CONFIG,
+    config: Config = CONFIG,
 ) -> None:
     """Install as services of systemd: units, users, folders, passwords, certificates, the broker's files."""
+    from services import document
     from services.command_line.secrets import own_hosts
     from services.config import load
     from services.credentials import passwords
-    from services.installation import steps
-    from services.installation.layout import SYSTEM
+    from services.installation import compose, layout, steps
 
-    if dry_run == systemd:
-        raise ConfigError(["install: expected one of --dry-run and --systemd"])
-    there = root / SYSTEM.relative_to("/") / config.name
+    if [dry_run, systemd, compose_file is not None].count(True) != 1:
+        raise ConfigError(["install: expected one of --dry-run, --systemd and --compose"])
+    there = root / layout.SYSTEM.relative_to("/") / config.name
     file = there if there.is_file() else config
     unknown = {name: PLACEHOLDER for names in passwords.names(file) for name in names}
     apartment = load(file, None, {**os.environ, **unknown})
+    if compose_file is not None:
+        document.write(compose_file, compose.compose(layout.parts(apartment), config.name))
+        return
     plan = [] if there.is_file() else list(steps.copied(config.parent))
     plan += steps.files(apartment, Path(sys.executable))
     plan += [steps.ACCOUNTS]

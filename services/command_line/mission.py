@@ -10,24 +10,21 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from services import client
 from services.bus import Message
 from services.client import Client
+from services.command_line.options import CONFIG, Config, Json, out
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.robot_payloads import MissionOrder, MissionResult, MissionState, Where, WhereReply
 from services.topics import MISSION_ORDER, MISSION_RESULT, MISSION_STATE, MISSION_WHERE, MISSION_WHERE_REPLY, read
 
 app = typer.Typer(no_args_is_help=True, help="Send a robot to find a marker, with the house's help.")
-out = Console(soft_wrap=True, highlight=False)
-Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
-Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
 Robot = Annotated[str | None, typer.Option("--robot", help="Which, where there are several.")]
-CONFIG = Path("config/apartment.yaml")
 ANSWER_S = 5.0
+LOOK_S = 600.0  # a scan may take so long
 FILTERS = (MISSION_STATE.filter, MISSION_RESULT.filter, MISSION_WHERE_REPLY.filter)
 Tell = Callable[[str], None]
 
@@ -61,11 +58,22 @@ def cancel(robot: Robot = None, config: Config = CONFIG) -> None:
 
 
 @app.command(epilog="Example: apartment mission where 582")
-def where(marker: int, robot: Robot = None, config: Config = CONFIG, json: Json = False) -> None:
-    """Show who has seen a marker where, how sure and how long ago; exit 1 when nobody has."""
+def where(
+    marker: int,
+    robot: Robot = None,
+    wait: Annotated[bool, typer.Option("--wait", help="For the house to look again, where that is long ago.")] = False,
+    config: Config = CONFIG,
+    json: Json = False,
+) -> None:
+    """Show who has seen a marker where, how sure and how long ago; exit 1 when nobody has.
+
+    When that is too long ago the house looks again meanwhile.
+    """
     with _robot(config, robot) as (bus, name):
-        reply = _seen(bus, name, marker)
+        reply = _seen(bus, name, marker, wait=wait)
     out.print_json(reply.model_dump_json()) if json else out.print(_table(reply))
+    if reply.refreshing and not json:
+        out.print("that is long ago or never: the house looks again now")
     if not reply.sightings:
         raise typer.Exit(1)
 
@@ -137,11 +145,14 @@ def _cancelled(bus: Client, robot: str) -> None:
     bus.payload(MISSION_STATE.name(robot=robot), lambda state: state.state == "idle", ANSWER_S)
 
 
-def _seen(bus: Client, robot: str, marker: int) -> WhereReply:
-    """Who has seen it where; TimeoutError when the mission service does not answer."""
+def _seen(bus: Client, robot: str, marker: int, *, wait: bool) -> WhereReply:
+    """Who has seen it where; with `wait` after the house has looked. TimeoutError when nobody answers."""
     asked = Where(marker=marker, id=uuid.uuid4().hex[:12])
     bus.publish(MISSION_WHERE.message(asked, robot=robot))
-    reply: WhereReply = bus.payload(MISSION_WHERE_REPLY.name(robot=robot, id=asked.id), timeout_s=ANSWER_S)
+    topic = MISSION_WHERE_REPLY.name(robot=robot, id=asked.id)
+    reply: WhereReply = bus.payload(topic, timeout_s=ANSWER_S)
+    if wait and reply.refreshing:
+        reply = bus.payload(topic, lambda later: not later.refreshing, LOOK_S)
     return reply
 
 

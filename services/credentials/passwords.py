@@ -38,6 +38,7 @@ def names(file: Path) -> tuple[list[str], list[str]]:
     source = document.read(file, note)
     wanted = [name for name in asked if any(f"expected ${{{name}}}" in fault for fault in source.faults)]
     ours = {name_of(account): None for account in access.accounts(cameras(source.value))}
+    ours |= {"DATABASE_ROOT_PASSWORD": None}  # of a database in a container; a system's own asks for none
     ours |= {name: None for name in wanted if not name.startswith(PEOPLES)}
     return list(ours), [name for name in wanted if name.startswith(PEOPLES)]
 

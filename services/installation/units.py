@@ -66,9 +66,9 @@ ExecStart={python} -m services serve {" ".join(names)} --config {config}
 {credentials}Restart=always
 RestartSec=2
 TimeoutStopSec=20
-MemoryMax={_memory(part)}M
+MemoryMax={memory(part)}M
 TasksMax=200
-ReadWritePaths={" ".join([str(STATE), *(f"-{path}" for path in _written(part))])}
+ReadWritePaths={" ".join([str(STATE), *(f"-{path}" for path in written(part))])}
 {HARDENED}RestrictAddressFamilies={families}
 
 [Install]
@@ -76,11 +76,12 @@ WantedBy={TARGET}
 """
 
 
-def _memory(part: Part) -> int:
+def memory(part: Part) -> int:
+    """The most that a process may take, MB."""
     return sum(MEMORY.get(one.row.name.removesuffix("-<cam>"), OTHERS) for one in part.services)
 
 
-def _written(part: Part) -> Iterator[Path]:
+def written(part: Part) -> Iterator[Path]:
     """The folders beside the configuration that a camera's service writes itself: places, lens, recordings."""
     for one in part.services:
         if one.row.section[0] == "cameras":
@@ -182,6 +183,6 @@ def users(parts: Iterable[Part]) -> str:
 def folders(parts: Iterable[Part]) -> str:
     """tmpfiles.d: what the services share; a new file there belongs to the group."""
     lines = [f"d {STATE} 2770 root {GROUP} -"]
-    for written in dict.fromkeys(path for part in parts for path in _written(part)):
-        lines += [f"d {written} 2770 root {GROUP} -", f"Z {written} ~2770 root {GROUP} -"]
+    for place in dict.fromkeys(path for part in parts for path in written(part)):
+        lines += [f"d {place} 2770 root {GROUP} -", f"Z {place} ~2770 root {GROUP} -"]
     return "\n".join(lines) + "\n"

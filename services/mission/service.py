@@ -11,8 +11,9 @@ from services.errors import BadMessage
 from services.mission.chart import Chart
 from services.mission.desk import Desk
 from services.mission.memory import Memory, by_camera
+from services.mission.refresh import Refresh
 from services.mission.settings import Config
-from services.robot_payloads import WhereReply
+from services.robot_payloads import Where, WhereReply
 from services.runner import Post
 
 USABLE = ("online", "degraded")
@@ -41,6 +42,7 @@ class Missions:
 
     def __init__(self, config: Config) -> None:
         self.memory = Memory()
+        self.refresh = Refresh(config.fresh_s, config.scan_s)
         self.desks = {
             name: Desk(name, config, Chart(*robot_places.read(config.folder / one.places)), self.memory)
             for name, one in config.robots.items()
@@ -49,7 +51,8 @@ class Missions:
     @property
     def due(self) -> float | None:
         """When `tick` is wanted."""
-        return min((desk.due for desk in self.desks.values()), default=None)
+        times = [*(desk.due for desk in self.desks.values()), self.refresh.due]
+        return min((time for time in times if time is not None), default=None)
 
     @property
     def counters(self) -> dict[str, float]:
@@ -64,7 +67,9 @@ class Missions:
         return self._of_house(read, now)
 
     def tick(self, now: float) -> Iterator[Message]:
-        """What is due at every desk."""
+        """What is due at every desk, and whose answer has waited for long enough."""
+        for robot, asked in self.refresh.late(now):
+            yield self._told(robot, asked, now)
         for desk in self.desks.values():
             yield from desk.tick(now)
 
@@ -79,14 +84,24 @@ class Missions:
         if read.topic is topics.ROBOT_SEEN:
             return desk.sees(read.payload, now)
         if read.topic is topics.MISSION_WHERE:
-            return [self._whereabouts(read, now)]
+            return self._where(desk, read.payload, now)
         desk.stands_at(read.payload, now)
         return ()
 
-    def _whereabouts(self, read: topics.Read, now: float) -> Message:
-        asked = read.payload
-        reply = WhereReply(id=asked.id, marker=asked.marker, sightings=self.memory.told(asked.marker, now))
-        return topics.MISSION_WHERE_REPLY.message(reply, robot=read.levels["robot"], id=asked.id)
+    def _where(self, desk: Desk, asked: Where, now: float) -> Iterator[Message]:
+        """Answers at once; where that is too old, and no mission needs the cameras, the house looks again."""
+        seen = self.memory.of(asked.marker)
+        cameras = [name for name, usable in desk.cameras.items() if usable]
+        free = cameras and not any(one.mission is not None for one in self.desks.values())
+        again = bool(free and asked.refresh and self.refresh.wanted(asked.marker, seen[0].at if seen else None, now))
+        yield self._told(desk.robot, asked, now, refreshing=again)
+        if again:
+            yield from self.refresh.begin(desk.robot, asked, cameras, now)
+
+    def _told(self, robot: str, asked: Where, now: float, *, refreshing: bool = False) -> Message:
+        sightings = self.memory.told(asked.marker, now)
+        reply = WhereReply(id=asked.id, marker=asked.marker, sightings=sightings, refreshing=refreshing)
+        return topics.MISSION_WHERE_REPLY.message(reply, robot=robot, id=asked.id)
 
     def _of_house(self, read: topics.Read, now: float) -> Iterator[Message]:
         if read.topic in (topics.CAMERA_MARKER, topics.CAMERA_SCAN_RESULT):
@@ -95,6 +110,8 @@ class Missions:
                 for desk in self.desks.values():
                     yield from desk.sighted(sighting, now)
         elif read.topic is topics.CAMERA_ORDER_RESULT:
+            for robot, asked in self.refresh.ended(read.payload):
+                yield self._told(robot, asked, now)
             for desk in self.desks.values():
                 yield from desk.scan_ended(read.levels["cam"], read.payload, now)
         elif read.topic is topics.CAMERA_STATUS:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, degrees, hypot, inf, pi, radians, sin, tan
+from math import atan2, degrees, hypot, inf, pi, radians, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.floor import XY, Grid
 
-DISTANCES_M = (0.5, 0.7, 0.9, 1.2, 1.5, 1.9, 2.3)  # to the marker that are tried
+RANGE_M = (0.45, 2.3)  # to the marker
 BEST_M, NEAREST_M = 1.2, 0.8  # as a rule; nearer to a print that lies high, and where there is no other place
-BEARINGS = 24  # directions round it that are tried
 APART_M = 0.6  # stands nearer to each other than this show the same
 OBLIQUE = radians(60)  # farther from the marker's face it is hard to read
 SLANT, STEEP = radians(50), radians(65)  # from above, to a print that lies: to be had at best, and at most
@@ -55,10 +54,10 @@ class View:
         """On a print that lies so far below the robot's camera."""
         return cls(above_m * tan(SLANT), above_m * tan(STEEP))
 
-    def cost(self, distance: float) -> float:
-        """What a distance is worse than the best, metres."""
-        near = TOO_NEAR if distance < min(NEAREST_M, self.best_m) else 0.0
-        return abs(distance - self.best_m) + (TOO_FLAT if distance > self.farthest_m else near)
+    def costs(self, distances: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What distances are worse than the best, metres."""
+        near = np.where(distances < min(NEAREST_M, self.best_m), TOO_NEAR, 0.0)
+        return np.abs(distances - self.best_m) + np.where(distances > self.farthest_m, TOO_FLAT, near)
 
 
 ANY = View()
@@ -72,31 +71,33 @@ def stands(
     `facing_deg`: the direction in which the marker's print faces, where it hangs; None: it can be read from all sides.
     Each keeps the robot's radius to what is not free, can be driven to, and has no occupied cell in its line of sight.
     """
-    found = sorted(_possible(grid, robot, target, facing_deg, view), key=lambda one: one[0])
+    at, costs = _possible(grid, robot, target, facing_deg, view)
     chosen: list[Pose] = []
-    for _, pose in found:
-        if len(chosen) < most and all(hypot(pose.x - other.x, pose.y - other.y) >= APART_M for other in chosen):
-            chosen.append(pose)
+    for index in np.argsort(costs, kind="stable"):
+        x, y = (float(part) for part in at[index])
+        if len(chosen) == most:
+            break
+        if all(hypot(x - other.x, y - other.y) >= APART_M for other in chosen) and grid.sees((x, y), target):
+            chosen.append(Pose(x, y, degrees(atan2(target[1] - y, target[0] - x))))
     return chosen
 
 
-def _possible(grid: Grid, robot: Body, target: XY, facing_deg: float | None, view: View) -> list[tuple[float, Pose]]:
-    possible = []
-    for distance in DISTANCES_M:
-        for bearing in np.arange(BEARINGS) * 2 * pi / BEARINGS:
-            aside = 0.0 if facing_deg is None else _between(bearing, radians(facing_deg))
-            x, y = float(target[0] + distance * cos(bearing)), float(target[1] + distance * sin(bearing))
-            if aside <= OBLIQUE and _may_stand(grid, robot, (x, y)) and grid.sees((x, y), target):
-                way = hypot(x - robot.at[0], y - robot.at[1])
-                cost = view.cost(distance) + WAY_COST * way + 0.5 * aside
-                possible.append((cost, Pose(x, y, degrees(atan2(target[1] - y, target[0] - x)))))
-    return possible
+def _possible(
+    grid: Grid, robot: Body, target: XY, facing_deg: float | None, view: View
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The middles of cells (n, 2) that the robot comes to, with the target in range and its face to them; the costs."""
+    at = grid.origin + (np.argwhere(robot.reach)[:, ::-1] + 0.5) * grid.resolution
+    away = np.hypot(*(at - target).T)
+    in_range = (away >= RANGE_M[0]) & (away <= RANGE_M[1])
+    at, away = at[in_range], away[in_range]
+    aside = np.zeros(len(at))
+    if facing_deg is not None:
+        aside = _between(np.arctan2(*(at - target).T[::-1]), radians(facing_deg))
+    way = np.hypot(*(at - robot.at).T)
+    costs = view.costs(away) + WAY_COST * way + 0.5 * aside
+    kept = aside <= OBLIQUE
+    return at[kept], costs[kept]
 
 
-def _may_stand(grid: Grid, robot: Body, at: XY) -> bool:
-    row, column = grid.cell(*at)
-    return grid.inside(row, column) and bool(robot.reach[row, column]) and grid.clear(*at, robot.radius)
-
-
-def _between(one: float, other: float) -> float:
-    return abs((one - other + pi) % (2 * pi) - pi)
+def _between(one: NDArray[np.float64], other: float) -> NDArray[np.float64]:
+    return np.asarray(np.abs((one - other + pi) % (2 * pi) - pi))

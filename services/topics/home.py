@@ -27,17 +27,27 @@ HOME_SET = Topic(
     "home/<item>/set", Kind.COMMAND, str, (*STEERS, "camera-<cam>"), ("openhab", "dashboard", "operator"), "postUpdate"
 )
 SERVICE_STATUS = Topic(
-    "service/<service>/status", Kind.STATE, str, ("<service>",), ALL, "`online` or `offline`, the latter as last will"
+    "service/<service>/status",
+    Kind.STATE,
+    str,
+    ("<service>",),
+    (*ALL, "metrics"),
+    "`online` or `offline`, the latter as last will",
 )
 SERVICE_INFO = Topic(
-    "service/<service>/info", Kind.STATE, p.ServiceInfo, ("<service>",), SHOWN, "version, start and counters"
+    "service/<service>/info",
+    Kind.STATE,
+    p.ServiceInfo,
+    ("<service>",),
+    (*SHOWN, "metrics"),
+    "version, start and counters",
 )
 DIAGNOSTICS = Topic(
     "diagnostics/<component>",
     Kind.STATE,
     p.Diagnostic,
     ALL,
-    (*SHOWN, "openhab"),
+    (*SHOWN, "openhab", "metrics"),
     "health of a component, about once a second",
     stored=True,
 )

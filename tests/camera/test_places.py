@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.camera.places import Places, name_of
+from services.camera.places import MOST, Places, name_of
 from services.camera.requests import Reading, Refused
 from services.errors import ConfigError
 from services.payloads import Place
@@ -176,3 +176,15 @@ def test_two_processes_that_save_at_once_lose_nothing_of_each_other(tmp_path: Pa
         one.join(30)
     assert [one.exitcode for one in others] == [0, 0]
     assert len(Places(tmp_path).named) == 40
+
+
+def test_whoever_saves_on_and_on_is_stopped(tmp_path: Path) -> None:
+    (tmp_path / "preset_position.yaml").write_text("".join(f"p{n}: [1, 2, 0]\n" for n in range(MOST)))
+    places = Places(tmp_path)
+    place = Place(pan=1, tilt=2, zoom=0, preset=None)
+    with pytest.raises(Refused, match="remove one"):
+        places.save("one more", place)
+    places.save("p0", place)
+    places.remove("p1")
+    places.save("one more", place)
+    assert len(places.named) == MOST

@@ -3,15 +3,17 @@ let in at all. On a real mosquitto, with the files that `apartment secrets init`
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
+import signal
 import socket
 import ssl
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import paho.mqtt.client as paho
@@ -20,7 +22,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from services import access
 from services.credentials import passwords
-from services.credentials.folder import Folder, fill
+from services.credentials.folder import Folder, fill, renew
 from services.peers import answers, free_port, program, running, wait_until
 from tests.credentials.rights import CAMERAS, STRANGE, Case, cases, may
 
@@ -40,6 +42,7 @@ class Broker:
     tls_port: int
     folder: Folder
     secrets: dict[str, str]
+    pid: int
 
 
 @pytest.fixture(scope="module")
@@ -60,8 +63,8 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
     text = text.replace("listener 8883", f"listener {tls_port} 127.0.0.1")
     (own / "here.conf").write_text(f"user root\n{text}")
     command = [program("mosquitto", "mosquitto"), "-c", str(own / "here.conf")]
-    with running(command, own / "mosquitto.log", lambda: answers(port) and answers(tls_port)):
-        yield Broker(port, tls_port, folder, secrets)
+    with running(command, own / "mosquitto.log", lambda: answers(port) and answers(tls_port)) as process:
+        yield Broker(port, tls_port, folder, secrets, process.pid)
 
 
 def _config(folder: Path) -> Path:
@@ -260,3 +263,25 @@ def test_other_machines_are_heard_by_tls_alone(broker: Broker) -> None:
     assert re.findall(r"(?m)^allow_anonymous (.*)", text) == ["false"]
     with pytest.raises(OSError, match="refused"):
         socket.create_connection(("127.0.0.2", broker.port), timeout=5)  # this machine too, by another of its addresses
+
+
+def test_a_renewed_certificate_is_shown_after_a_reload_and_nobody_is_thrown_out(broker: Broker) -> None:
+    def shown() -> str:
+        context = ssl.create_default_context(cafile=str(broker.folder.authority))
+        with (
+            socket.create_connection(("127.0.0.1", broker.tls_port), timeout=LIMIT_S) as plain,
+            context.wrap_socket(plain, server_hostname="127.0.0.1") as encrypted,
+        ):
+            der = encrypted.getpeercert(binary_form=True)
+        assert der is not None
+        return ssl.DER_cert_to_PEM_cert(der).strip()
+
+    before = shown()
+    with mouth(broker, "bridge") as stays:
+        list(renew(broker.folder, timedelta(days=9999), datetime.now(UTC)))
+        pair = broker.folder.pair("broker")
+        assert pair is not None
+        os.kill(broker.pid, signal.SIGHUP)
+        wait_until(lambda: shown() == pair.certificate.strip(), "the new certificate", LIMIT_S)
+        assert stays.client.is_connected()
+    assert shown() != before

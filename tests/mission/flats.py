@@ -40,7 +40,7 @@ HIGHEST_M = 0.95  # of what it lies on: the robot looks down from 1.1 m
 AWAY_M = 0.75  # of things that stand about, from the named points
 LONGEST_S = 1800.0
 SMALL = {f"Encode[0].MainFormat[0].Video.{side}": str(pixels) for side, pixels in (("Width", 1152), ("Height", 648))}
-UNWANTED = ("persistence", "history", "bridge")  # they take part in no mission
+UNWANTED = ("persistence", "history", "bridge", "dashboard")  # they take part in no mission
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +178,7 @@ def configured(flat: Flat, folder: Path, *, house: bool = True) -> Path:
     for name in UNWANTED:
         del sections[name]
     del sections["simulators"]["home"]
+    sections["simulators"]["robot"]["on_bus"] = True
     if not house:
         del sections["cameras"], sections["default_camera"], sections["simulators"]["camera"]
     config.write_text(yaml.safe_dump(sections), encoding="utf-8")
