@@ -96,10 +96,11 @@ class _Lanes:
         """A stretch of time with words in it, as far as they fit; `short`: instead, where they do not."""
         left, width = self.x(since), max(2.0, self.x(until) - self.x(since))
         self.paper.box(left, self.y + 6, max(1.5, width - 1), LANE - 16, colour)
-        if width > 20:
-            fits = self.paper.width(words, 10) <= width - 8
-            fitting = words if fits else short or self.paper.fitting(words, 10, width - 8)
-            self.paper.text((left + 4, self.y + LANE / 2 + 2), fitting, WHITE, 10, 500)
+        shown = next((one for one in (words, short) if one and self.paper.width(one, 10, 500) <= width - 7), "")
+        if not shown and not short:
+            shown = self.paper.fitting(words, 10, width - 8)
+        if len(shown) > 2 or shown in (words, short):
+            self.paper.text((left + 4, self.y + LANE / 2 + 2), shown, WHITE, 10, 500)
 
 
 def _lanes(paper: Paper, told: Timeline) -> None:

@@ -38,7 +38,7 @@ class Where:
 
 def kinds() -> list[str]:
     """The robots that there is a file for."""
-    shared = ("actions", "chain", "commander", "eyes", "goals", "pipe", "senses")
+    shared = ("actions", "chain", "commander", "eyes", "goals", "kept", "pipe", "senses")
     return sorted(file.stem for file in Path(__file__).parent.glob("[a-z]*.py") if file.stem not in shared)
 
 

@@ -92,6 +92,12 @@ class Goals:
         self._remember(refused)
         return refused
 
+    def left(self, goal_id: str) -> GotoResult:
+        """The goal of a bridge before us, which ended with it."""
+        end = GotoResult(id=goal_id, state="cancelled", reason="the bridge was started anew")
+        self._remember(end)
+        return end
+
     def cancel(self, goal_id: str | None, reason: str) -> Iterator[Said]:
         """Ends the goal under way, with `goal_id` only that one. It ends for us at once: nobody waits for a server that
         is away, and what it says later of that goal is old."""

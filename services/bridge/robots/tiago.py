@@ -23,6 +23,7 @@ from services.bridge.robots import Where, actions
 from services.bridge.robots.actions import Action
 from services.bridge.robots.commander import SERVICE, Commander
 from services.bridge.robots.goals import Goals, Said, Send
+from services.bridge.robots.kept import Kept
 from services.bridge.robots.pipe import Felt, UnderWay, Wanted
 from services.bridge.rules import Fields, Heard
 from services.bus import Message
@@ -90,7 +91,8 @@ def part(robot: str, settings: Section, where: Where) -> Tiago:
     assert isinstance(settings, Settings)
     given = settings.places
     places = robot_places.read(where.folder / given)[0] if given else robot_places.RobotPlaces()
-    return Tiago(robot, settings, places, Child(robot, _feel, wanted(robot, settings, where), 1.0))
+    child = Child(robot, _feel, wanted(robot, settings, where), 1.0)
+    return Tiago(robot, settings, places, child, Kept(where.state / "robots" / robot if where.state else None))
 
 
 def _feel(wanted: Wanted, connection: Connection, every_s: float) -> None:
@@ -131,7 +133,7 @@ class Tiago(Part):
 
     rows = (topics.ROBOT_GOTO, topics.ROBOT_CANCEL, topics.MISSION_STATE, topics.SERVICE_STATUS)
 
-    def __init__(self, robot: str, settings: Settings, places: RobotPlaces, child: Child | None) -> None:
+    def __init__(self, robot: str, settings: Settings, places: RobotPlaces, child: Child | None, kept: Kept) -> None:
         self._robot, self._settings, self._places, self._child = robot, settings, places, child
         servers = _servers(settings)
         self._move_base, self._poi = servers[0], servers[1] if len(servers) > 1 else None
@@ -147,6 +149,9 @@ class Tiago(Part):
         self._commander = Commander()
         self._to_ros: list[Send] = []
         self._to_bus: list[GotoResult] = []
+        self._kept = kept
+        if (left := kept.read()) is not None:
+            self._to_bus.append(self.goals.left(left))
         self._told: tuple[str, str] | None = None  # the goal under way, as the senses know it
         self._felt: Felt | None = None
         self.due = self._feel_due = 0.0
@@ -186,6 +191,7 @@ class Tiago(Part):
             self._take(self.goals.tick(now, listens=node.listeners(goal.action.goal) > 0))
             if self._commander.is_gone(goal.id, now):
                 self._take(self.goals.cancel(goal.id, "the mission service is gone, so that nobody follows the robot"))
+        self._kept.write(self.goals.goal.id if self.goals.goal else None)
         if self._child is not None and self.goals.under_way != self._told:
             self._told = self.goals.under_way
             self._child.tell(UnderWay(self._told))

@@ -45,7 +45,7 @@ def flat(master: ros.Master, run_bridge: Run) -> Iterator[tuple[ros.Master, Run,
     """The simulated robot, and a bridge that speaks for it."""
     with program(master, "tests.bridge.robots.robot_process"):
         wait_until(lambda: publishers(master, "/move_base/status") != [], "the robot", PATIENCE_S)
-        bridge = run_bridge(master.env, {}, robots={"tiago": ROBOT}, cameras=[])
+        bridge = run_bridge(master.env, {}, robots={"tiago": ROBOT}, cameras=[], state=str(master.folder))
         bridge.says(POSE, lambda _: True)
         yield master, run_bridge, bridge
 
@@ -107,7 +107,7 @@ def test_it_drives_looks_and_says_what_became_of_it(flat: Any) -> None:
     go(bridge, "one", x=4.2, y=3.0, yaw_deg=93.0)
     told(bridge, "one", "accepted")
     assert told(bridge, "one", "arrived", "failed", "cancelled") == "Goal reached."
-    assert hypot(newest(bridge)[0] - 4.2, newest(bridge)[1] - 3.0) < 0.15
+    bridge.says(POSE, lambda text: hypot(json.loads(text)["x"] - 4.2, json.loads(text)["y"] - 3.0) < 0.15)
     since = len(bridge.said)
     bridge.says(SEEN, lambda text: '"marker":582' in text, since)
     seen = next(text for _, topic, text in bridge.said[since:] if topic == SEEN and '"marker":582' in text)
@@ -115,7 +115,7 @@ def test_it_drives_looks_and_says_what_became_of_it(flat: Any) -> None:
     world = load(ROOT / "config" / "world.yaml")
     truth = world.map.apartment_to_map.transform.apply(world.marker(582).pose.translation)
     error = [marker["position"][axis] - truth[index] for index, axis in enumerate("xyz")]
-    assert hypot(*error) < 0.10, "within what its belief of its own place allows"
+    assert hypot(*error) < 0.15, "within what its belief of its own place allows"
 
     go(bridge, "walled", x=-5.0, y=-5.0)
     assert "valid plan" in told(bridge, "walled", "failed")
@@ -123,18 +123,19 @@ def test_it_drives_looks_and_says_what_became_of_it(flat: Any) -> None:
 
 def test_a_cancel_and_the_death_of_the_bridge_stop_it_and_a_new_one_tells_of_the_goal(flat: Any) -> None:
     master, run_bridge, bridge = flat
-    go(bridge, "far", point="Desk")
+    go(bridge, "far", point="Bedroom")
     drives(bridge)
     bridge.hears("robot/tiago/cancel", json.dumps({"id": "far"}))
     told(bridge, "far", "cancelled")
     stands(bridge)
 
-    go(bridge, "farther", point="Bedroom")
-    drives(bridge)
     with ended(master) as result:
+        go(bridge, "farther", point="Kitchen")
+        drives(bridge)
         os.kill(bridge.process.pid, signal.SIGKILL)
         assert result() == "2", "preempted, although there is no bridge any more"
-    after = run_bridge(master.env, {}, robots={"tiago": ROBOT}, cameras=[], log="after.log")
+    again = {"robots": {"tiago": ROBOT}, "cameras": [], "state": str(master.folder), "log": "after.log"}
+    after = run_bridge(master.env, {}, **again)
     after.says(POSE, lambda _: True)
     told(after, "farther", "cancelled")
     stands(after)
@@ -144,7 +145,7 @@ def test_a_cancel_and_the_death_of_the_bridge_stop_it_and_a_new_one_tells_of_the
 
 def test_after_a_new_master_it_goes_on_and_so_does_a_new_bridge(flat: Any) -> None:
     master, run_bridge, bridge = flat
-    go(bridge, "during", point="Hall")
+    go(bridge, "during", point="Bedroom")
     drives(bridge)
     master.kill()
     master.start()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from math import cos, radians, sin
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from services.bridge.program import check
 from services.bridge.robots import kinds
 from services.bridge.robots.commander import GONE_S
 from services.bridge.robots.goals import AGAIN_S, FORGOTTEN_S, SILENT_S, TAKEN_S
+from services.bridge.robots.kept import Kept
 from services.bridge.robots.tiago import DICTIONARY, Settings, Tiago
 from services.bridge.rules import read
 from services.bridge.service import Bridge
@@ -33,8 +35,8 @@ OURS = "apartment/tiago/"
 class Robot:
     """The part, its node, and what both said."""
 
-    def __init__(self, **settings: Any) -> None:
-        self.part = Tiago("tiago", Settings(**settings), PLACES, None)
+    def __init__(self, kept: Path | None = None, **settings: Any) -> None:
+        self.part = Tiago("tiago", Settings(**settings), PLACES, None, Kept(kept))
         self.node = SimulatedNode(self.part.ports, lambda _: None)
         self.now = NOW
         self.sent: list[tuple[str, Any]] = []
@@ -201,6 +203,23 @@ def test_a_goal_of_a_bridge_before_us_is_cancelled_and_told_of(robot: Robot) -> 
     assert told == [("m-g3 cancelled", "nobody was there to follow it")]
     assert robot.cancels() == [("/move_base/cancel", f"{OURS}m-g3")]
     assert robot.status((f"{OURS}m-g3", PREEMPTED)) == []
+
+
+def test_the_goal_that_ended_with_the_bridge_is_told_of_by_the_next_one(tmp_path: Path) -> None:
+    file = tmp_path / "robots" / "tiago"
+    Robot(file).says("goto", x=0.0, y=0.0, id="m-g3")
+    after = Robot(file)
+    assert after.tick() == [("m-g3 cancelled", "the bridge was started anew")]
+    assert after.status((f"{OURS}m-g3", PREEMPTED)) == []
+    assert Robot(file).tick() == []
+
+
+def test_a_file_that_cannot_be_read_or_written_stops_nobody(tmp_path: Path) -> None:
+    robot = Robot(tmp_path)
+    robot.says("goto", x=0.0, y=0.0, id="g")
+    assert robot.part.goals.under_way is not None
+    (tmp_path / "rubbish").write_bytes(b"\xff\xfe")
+    assert Robot(tmp_path / "rubbish").tick() == []
 
 
 def test_the_goal_of_a_lost_bus_is_cancelled(robot: Robot) -> None:
