@@ -19,6 +19,7 @@ from rich.table import Table
 from services import access, client, process, secret_store, topics
 from services.bus import Message
 from services.command_line import backup, calibrate, dashboard, doctor, install, mission, openhab, secrets, stored
+from services.command_line.options import CONFIG, Config, Json, out
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -29,11 +30,7 @@ app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
     help="A smart apartment, its ceiling camera and a ROS 1 robot on one MQTT event bus.",
 )  # fmt: skip
-Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
-Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
-CONFIG = Path("config/apartment.yaml")
 STATUS_S = 1.0  # how long retained states may take to come
-out = Console(soft_wrap=True, highlight=False)
 err = Console(stderr=True, soft_wrap=True, highlight=False)
 
 

@@ -64,6 +64,7 @@ def _show_services(out: Console, running: Simulated) -> None:
     out.print(ready_line("demo", running.addresses), markup=False, style="dim")
     out.print(f"Running: {', '.join(running.ready)}.")
     out.print(f"Their log: {running.log}", style="dim")
+    out.print(f"The dashboard: {running.ready['dashboard']['url']}")
     port = running.apartment.bus.port
     out.print(f"Try it: mosquitto_pub -p {port} -t home/Kitchen_Light/command -m ON", style="dim")
     out.print(f"        mosquitto_pub -p {port} -t camera/ip1/order/Goto -m Kitchen", style="dim")

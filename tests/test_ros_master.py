@@ -12,7 +12,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
-from services.bridge import master as master_module
+from services import ros_master as master_module
 from services.errors import Unavailable
 from services.peers import free_port
 from services.ros_master import Master, Registrations, register

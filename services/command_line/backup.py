@@ -9,16 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
+from services.command_line.options import CONFIG, Config, out
 from services.config import Apartment, load
 
 if TYPE_CHECKING:  # the databases' libraries, for these commands alone
     from services.storage import Address
-
-out = Console(soft_wrap=True, highlight=False)
-CONFIG = Path("config/apartment.yaml")
-Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
 
 
 def backup(file: Path, config: Config = CONFIG) -> None:

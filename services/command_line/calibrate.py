@@ -13,7 +13,6 @@ from time import time
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.live import Live
 from rich.prompt import Confirm
 from rich.table import Table
@@ -23,6 +22,7 @@ from services import client, document
 from services.client import Client
 from services.command_line import prints
 from services.command_line.calibrate_map import map_
+from services.command_line.options import CONFIG, Config, YesMove, out
 from services.command_line.prints import Book, Inner, Kind, Side, Squares, squares_of
 from services.command_line.zoom import zoom
 from services.config import Apartment, load
@@ -31,11 +31,7 @@ from services.payloads import Calibration, OrderResult
 from services.topics import CAMERA_CALIBRATION, CAMERA_ORDER_RESULT, read
 
 app = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
-out = Console(soft_wrap=True, highlight=False)
-Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
-YesMove = Annotated[bool, typer.Option("--yes-move", help="It may move; else the terminal is asked.")]
 Report = Annotated[Path | None, typer.Option("--out", help="Where the report goes; default <camera>-<what>.html.")]
-CONFIG = Path("config/apartment.yaml")
 MOTORS_S, TOUR_S, SLACK_S = 600.0, 1800.0, 120.0
 BAR, FULL, EMPTY = 30, "#", "."
 ASK = "May {} turn now? It looks for the markers all around, for some minutes, and returns to where it looked."

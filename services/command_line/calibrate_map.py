@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from pydantic import ValidationError
-from rich.console import Console
 from rich.prompt import Confirm
 from rich.table import Table
 
 from services import client, document
 from services.bus import Message
+from services.command_line.options import CONFIG, Config, out
 from services.config import Apartment, load
 from services.errors import BadMessage, ConfigError
 from services.section import Section
@@ -30,8 +30,6 @@ if TYPE_CHECKING:  # numbers, for this command alone: every process of a service
     from services.robot_places import Relation
     from services.vision.calibrate_map import MapFit, Pair
 
-out = Console(soft_wrap=True, highlight=False)
-CONFIG = Path("config/apartment.yaml")
 TOO_FAR = 5.0  # times what a point was measured to
 POSE_S = 10.0  # a robot says where it is at least so often
 XY = tuple[float, float]
@@ -61,7 +59,7 @@ def map_(
     robot: Annotated[str | None, typer.Option(help="Which, where there are several.")] = None,
     diff: Annotated[bool, typer.Option("--diff", help="Show what would change, and change nothing.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Write it without asking.")] = False,
-    config: Annotated[Path, typer.Option("--config", help="The configuration file.")] = CONFIG,
+    config: Config = CONFIG,
 ) -> None:
     """Learn where the apartment lies in a robot's map, from two or more points known in both.
 

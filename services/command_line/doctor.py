@@ -7,19 +7,15 @@ from __future__ import annotations
 
 import os
 from dataclasses import asdict
-from pathlib import Path
-from typing import Annotated
 
 import typer
-from rich.console import Console
 
-CONFIG = Path("config/apartment.yaml")
-out = Console(soft_wrap=True, highlight=False)
+from services.command_line.options import CONFIG, Config, Json, out
 
 
 def doctor(
-    config: Annotated[Path, typer.Option("--config", help="The configuration file.")] = CONFIG,
-    json: Annotated[bool, typer.Option("--json", help="Data instead of text.")] = False,
+    config: Config = CONFIG,
+    json: Json = False,
 ) -> None:
     """Look whether all that the apartment needs is well, and name the mend of what is not (then exit 1)."""
     from services.doctor.examination import examine  # databases and HTTP, for this command alone

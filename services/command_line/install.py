@@ -11,13 +11,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
+from services.command_line.options import CONFIG, Config, out
 from services.errors import ConfigError
 
-CONFIG = Path("config/apartment.yaml")
 PLACEHOLDER = "not yet known"  # for a secret that the check of a new configuration would miss
-out = Console(soft_wrap=True, highlight=False)
 
 
 def install(
@@ -28,7 +26,7 @@ def install(
         Path | None, typer.Option("--compose", help="Write a compose file there, for containers.")
     ] = None,
     root: Annotated[Path, typer.Option(help="Write below this folder instead, and run nothing.")] = Path("/"),
-    config: Annotated[Path, typer.Option("--config", help="The configuration file.")] = CONFIG,
+    config: Config = CONFIG,
 ) -> None:
     """Install as services of systemd: units, users, folders, passwords, certificates, the broker's files."""
     from services import document

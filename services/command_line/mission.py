@@ -10,23 +10,19 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from services import client
 from services.bus import Message
 from services.client import Client
+from services.command_line.options import CONFIG, Config, Json, out
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.robot_payloads import MissionOrder, MissionResult, MissionState, Where, WhereReply
 from services.topics import MISSION_ORDER, MISSION_RESULT, MISSION_STATE, MISSION_WHERE, MISSION_WHERE_REPLY, read
 
 app = typer.Typer(no_args_is_help=True, help="Send a robot to find a marker, with the house's help.")
-out = Console(soft_wrap=True, highlight=False)
-Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
-Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
 Robot = Annotated[str | None, typer.Option("--robot", help="Which, where there are several.")]
-CONFIG = Path("config/apartment.yaml")
 ANSWER_S = 5.0
 LOOK_S = 600.0  # a scan may take so long
 FILTERS = (MISSION_STATE.filter, MISSION_RESULT.filter, MISSION_WHERE_REPLY.filter)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from services import document, secret_store
+from services.command_line.options import CONFIG, Config, Json
 from services.config import Apartment, load
 from services.errors import ConfigError
 
@@ -16,10 +17,8 @@ if TYPE_CHECKING:  # the grammars and HTTP, for these commands alone: every proc
     from services.openhab.folder import Plan
     from services.openhab.site import Broker, BusDesign, Camera
 
-CONFIG = Path("config/apartment.yaml")
 DESIGNS = ("dsl", "js", "links")
 app = typer.Typer(no_args_is_help=True, help="OpenHAB's files: write them, check them, make a home.yaml of them.")
-Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
 OpenHab = Annotated[str, typer.Option("--openhab", help="2.5, 3, 4, 5, or a release such as 4.2.")]
 
 
@@ -107,7 +106,7 @@ def _camera(apartment: Apartment, name: str) -> Camera:
 def check_(
     files: Annotated[list[Path], typer.Argument(help="Files, or folders of them.")],
     openhab: OpenHab = "5",
-    json: Annotated[bool, typer.Option("--json", help="Data instead of text.")] = False,
+    json: Json = False,
     live: Annotated[
         str | None, typer.Option("--live", help="A running OpenHAB (5.1 on) to ask too; its token: OPENHAB_TOKEN.")
     ] = None,

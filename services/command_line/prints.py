@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
+from services.command_line.options import out
 from services.errors import ConfigError
 
-out = Console(soft_wrap=True, highlight=False)
 Kind = Annotated[str, typer.Option("--board", help="charuco, or chessboard.")]
 Squares = Annotated[str, typer.Option("--squares", help="Columns x rows of squares (not of inner corners).")]
 Side = Annotated[float, typer.Option("--square", help="Side of a square as printed, mm.")]

@@ -12,18 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from services import secret_store
+from services.command_line.options import CONFIG, Config, out
 from services.errors import ConfigError
 
 if TYPE_CHECKING:  # certificates, for these commands alone
     from services.credentials.folder import Folder
 
 app = typer.Typer(no_args_is_help=True, help="Passwords and certificates of an installation.")
-out = Console(soft_wrap=True, highlight=False)
-CONFIG = Path("config/apartment.yaml")
-Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
 Out = Annotated[
     Path | None, typer.Option("--out", help="Their folder; default /etc/apartment/secrets or ~/.config/...")
 ]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from pydantic import ValidationError
 
+from services.command_line.options import CONFIG, Config, Json
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.payloads import HistoryGet
@@ -26,11 +27,8 @@ if TYPE_CHECKING:  # the databases' libraries, for these commands alone
     from services.persistence.openhab_tables import Tally
     from services.storage import Address
 
-Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
-Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
 Admin = Annotated[str, typer.Option(help="Who may make accounts there; DATABASE_ADMIN_PASSWORD, or by the socket.")]
 NO_VIEWS = "no_views_there"  # an address wants the name of a database for views; another one has none
-CONFIG = Path("config/apartment.yaml")
 db = typer.Typer(no_args_is_help=True, help="The database: make, check, upgrade, import, export, let others read.")
 
 

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.prompt import Confirm
 from rich.table import Table
 
 from services import client, topics
 from services.bus import Message
+from services.command_line.options import CONFIG, Config, YesMove, out
 from services.config import load
 from services.errors import ConfigError
 from services.payloads import Calibration, OrderResult
 
-out = Console(soft_wrap=True, highlight=False)
-Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
-CONFIG = Path("config/apartment.yaml")
 LONGEST_S = 900.0
 ASK = (
     "May {} zoom in and out now? It takes some minutes; it should look at something with outlines, not at a blank wall."
@@ -28,7 +23,7 @@ ASK = (
 
 def zoom(
     camera: str,
-    yes_move: Annotated[bool, typer.Option("--yes-move", help="It may move; else the terminal is asked.")] = False,
+    yes_move: YesMove = False,
     config: Config = CONFIG,
 ) -> None:
     """Learn what each level of zoom magnifies by, from pictures of what the camera looks at; exit 1 when it was not."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 import asyncio
 import time
 import uuid
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Coroutine
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from services import topics
 from services.bus import Message
@@ -24,6 +24,7 @@ from services.errors import Unavailable
 from services.payloads import HistoryGet, HistoryReply
 from services.runner import Post
 
+Part = TypeVar("Part", str, bytes)
 ANSWER_S = 15.0
 MOST_QUESTIONS = 50  # that wait for the history at once
 
@@ -84,6 +85,17 @@ class House:
         """Ends what runs for the pages."""
         for one in self.closing:
             await one()
+
+    async def while_logged_in(self, token: str | None, parts: AsyncIterator[Part]) -> AsyncIterator[Part]:
+        """A stream that ends with the session that it was opened by; an open page keeps the session from being idle."""
+        try:
+            async for part in parts:
+                if self.config.users and self.sessions.find(token, time.time()) is None:
+                    return
+                yield part
+        finally:
+            if isinstance(parts, AsyncGenerator):
+                await parts.aclose()
 
     def latest(self, topic: str) -> str | None:
         """The newest text on a topic."""

@@ -19,7 +19,7 @@ MOST_TOPICS = 20_000  # the oldest go
 MOST_PAGES = 100
 PAST = {  # what a page is told of what was, when it opens: so many of each
     "camera/+/order_result": 40, "camera/+/scan/result": 40, "camera/+/audio": 20, "home/+/command": 40,
-    "mission/+/result": 20, "mission/+/state": 80, "robot/+/pose": 240,
+    "/dashboard/rates": 60, "mission/+/result": 20, "mission/+/state": 80, "robot/+/pose": 240,
 }  # fmt: skip
 BEAT_S = 10.0  # without news a page hears that we are there
 Filters = tuple[str, ...]

@@ -47,11 +47,12 @@ class View:
         self._counts: Counter[str] = Counter()
         self._counted_from = 0.0
         self._last = 0.0
-        self._kinds: dict[str, str] = {}
 
     def take(self, message: Message, now: float) -> None:
-        """Notes a message; BadMessage when the table of topics does not know it."""
-        kind = self._kind(message.topic)
+        """Notes a message; BadMessage when it is not what the table of topics says, so that pages may trust it."""
+        cleared = message.retain and not message.payload
+        row = topics.find(message.topic)[0] if cleared else topics.read(message, now).topic
+        kind = KINDS[row.kind]
         text = "" if kind == "b" else message.payload.decode("utf-8", "replace")
         self._counts[message.topic.partition("/")[0]] += 1
         entry = Entry(message.topic, text[:LONGEST], round(message.received * 1000), kind)
@@ -84,15 +85,6 @@ class View:
             self.tell(RATES, json.dumps(rates), now)
         self._counts = Counter(dict.fromkeys(rates, 0))
         self._counted_from = now
-
-    def _kind(self, topic: str) -> str:
-        kind = self._kinds.get(topic)
-        if kind is None:
-            row, _ = topics.find(topic)
-            if len(self._kinds) > MOST_EVENTS * 10:
-                self._kinds.clear()
-            kind = self._kinds[topic] = KINDS[row.kind]
-        return kind
 
 
 def heard(account: str = "dashboard") -> tuple[str, ...]:

@@ -74,12 +74,17 @@ def flood(folder: Path, seconds: float = FLOOD_S) -> Iterator[Row]:
         page.evaluate(TASKS)
         with Browser(url) as asking:
             before, first, began = _cpu_s(pid), _taken(asking), time.monotonic()
-            page.wait_for_timeout(seconds * 1000)
+            shown = page.locator(".card .value").all_text_contents()
+            page.wait_for_timeout(seconds * 500)
+            moved = sum(a != b for a, b in zip(shown, page.locator(".card .value").all_text_contents(), strict=True))
+            browsers.view(page, "bus")
+            page.wait_for_timeout(seconds * 500)
             spent, messages, took = _cpu_s(pid) - before, _taken(asking) - first, time.monotonic() - began
         tasks = page.evaluate("() => window.tasks")
     yield Row(f"server, {ITEMS} items at {RATE} msg/s, {VIEWERS} viewers", spent / took, "cores", "< 1")
     yield Row("messages that it took of them", messages / took, "msg/s", f"{RATE}")
-    yield Row("longest task of the page meanwhile", max(tasks, default=0.0), "ms", "< 200")
+    yield Row("items of the page that changed meanwhile", moved, "", f"{ITEMS}")
+    yield Row("longest task of the page, Devices and Bus", max(tasks, default=0.0), "ms", "< 200")
     yield Row("tasks over 50 ms meanwhile", len(tasks), "", "")
 
 

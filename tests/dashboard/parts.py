@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import ssl
 import threading
 import time
 from collections.abc import Iterator
@@ -43,10 +44,11 @@ class Running:
     folder: Path
     bus: Client
     settings: BusSettings
+    ca: Path | None = None
 
     def browser(self, user: str | None = None) -> Browser:
         """Somebody with a cookie jar, logged in as that user."""
-        browser = Browser(self.url)
+        browser = Browser(self.url, self.ca)
         if user is not None:
             browser.login(user)
         return browser
@@ -55,8 +57,9 @@ class Running:
 class Browser:
     """What a browser does for a page, without one."""
 
-    def __init__(self, url: str) -> None:
-        self.http = httpx.Client(base_url=url, timeout=30.0, trust_env=False)
+    def __init__(self, url: str, ca: Path | None = None) -> None:
+        verify = ssl.create_default_context(cafile=str(ca)) if ca else True
+        self.http = httpx.Client(base_url=url, timeout=30.0, trust_env=False, verify=verify)
         self.csrf = self.http.get("/api/session").json().get("csrf") or ""
 
     def __enter__(self) -> Browser:
@@ -92,16 +95,16 @@ def configured(folder: Path, port: int, **changes: Any) -> Config:
 
 
 @contextmanager
-def running(folder: Path, **changes: Any) -> Iterator[Running]:
+def running(folder: Path, ca: Path | None = None, **changes: Any) -> Iterator[Running]:
     """A broker and a dashboard with the account that it has in an installation; Missing without mosquitto."""
     with ExitStack() as stack:
         broker = stack.enter_context(mosquitto.private(folder / "mosquitto", anonymous=True))
         settings = BusSettings(port=broker.port, accounts={"dashboard": SecretStr(broker.passwords["dashboard"])})
         url = stack.enter_context(service(configured(folder, broker.port, **changes), settings, folder))
         bus = stack.enter_context(connected(BusSettings(port=broker.port), ["#"]))
-        with Browser(url) as browser:
+        with Browser(url, ca) as browser:
             peers.wait_until(lambda: _online(browser), "the dashboard to hear the broker")
-        yield Running(url, folder, bus, settings)
+        yield Running(url, folder, bus, settings, ca)
 
 
 def _online(browser: Browser) -> bool:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import socket
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx
@@ -13,9 +15,13 @@ import pytest
 from openapi_spec_validator import validate
 
 from services import peers, topics
+from services.config import BusSettings
 from services.dashboard.sessions import FREE_TRIES
+from services.dashboard.settings import Tls
 from services.payloads import HistoryReply, seconds
-from tests.dashboard.parts import PASSWORD, USERS, Running, running
+from services.peers import mosquitto
+from tests.bus.test_tls import certificates
+from tests.dashboard.parts import PASSWORD, USERS, Browser, Running, configured, running, service
 
 pytestmark = pytest.mark.mosquitto
 
@@ -308,6 +314,62 @@ def test_a_span_that_is_none_is_told(guarded: Running, query: str) -> None:
         assert person.get("/api/history/Nothing").status_code == 422
 
 
+def test_a_page_that_is_open_hears_nothing_more_after_its_session_was_ended(guarded: Running) -> None:
+    with (
+        guarded.browser("ann") as person,
+        person.http.stream("GET", "/api/live", params={"topics": "diagnostics/#"}) as answer,
+    ):
+        lines = answer.iter_lines()
+        assert next(lines) == "event: snapshot"
+        assert person.post("/api/logout").status_code == 200
+        assert len(list(lines)) < 20  # diagnostics come every second: it ends at the next, or this one goes on for ever
+
+
+def test_a_stream_is_not_opened_by_head(guarded: Running) -> None:
+    with guarded.browser("vic") as person:
+        assert person.http.head("/api/live").status_code == 405
+
+
+def test_over_tls_the_cookie_goes_over_tls_alone(tmp_path: Path) -> None:
+    try:
+        ca, cert, key = certificates(tmp_path / "ca", "our own CA")
+    except peers.Missing as missing:
+        pytest.skip(str(missing))
+    with running(tmp_path / "tls", ca, users=USERS, tls=Tls(cert=cert, key=key)) as made, made.browser() as person:
+        assert made.url.startswith("https://")
+        answer = person.login("ann")
+        assert answer.headers["set-cookie"].startswith("__Host-apartment=")
+        assert "Secure" in answer.headers["set-cookie"]
+        assert "max-age" in answer.headers["strict-transport-security"]
+        assert person.get("/api/session").json()["user"] == "ann"
+        path = "/api/items/Kitchen_Light/command"
+        assert person.post(path, {"value": "ON"}, Origin=made.url).status_code == 202
+        assert person.post(path, {"value": "ON"}, Origin=made.url.replace("https", "http")).status_code == 403
+
+
+def test_who_does_not_read_keeps_nobody_waiting(guarded: Running) -> None:
+    """More than the network's own buffers hold goes to a page that takes nothing, and to one beside it."""
+    items, rounds, text = 50, 12, "x" * 15_000
+    host, port = guarded.url.removeprefix("http://").split(":")
+    with guarded.browser("vic") as person, socket.socket() as lazy:
+        lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        lazy.connect((host, int(port)))
+        cookie = f"Cookie: apartment={person.http.cookies['apartment']}"
+        lazy.sendall(
+            f"GET /api/live?topics=home/%2B/state HTTP/1.1\r\nHost: {host}:{port}\r\n{cookie}\r\n\r\n".encode()
+        )
+        with person.http.stream("GET", "/api/live", params={"topics": "home/+/state"}) as answer:
+            lines = answer.iter_lines()
+            assert next(lines) == "event: snapshot"
+            for number in range(rounds):
+                for item in range(items):
+                    guarded.bus.say(f"home/Large_{item}/state", f"{number} {text}", retain=True)
+                assert next(line for line in lines if f'Large_{items - 1}/state","{number} xxx' in line)
+        assert lazy.recv(12) == b"HTTP/1.1 200"
+    for item in range(items):
+        guarded.bus.say(f"home/Large_{item}/state", "", retain=True)
+
+
 def test_a_robots_map_is_a_picture(guarded: Running) -> None:
     with guarded.browser("vic") as person:
         answer = person.get("/api/robots/tiago/map.png")
@@ -320,3 +382,26 @@ def test_the_page_is_small() -> None:
     from services.dashboard.http.files import Files
 
     assert sum(len(file.packed) for file in Files()._files.values()) < 300_000
+
+
+def test_while_the_broker_is_away_nothing_is_ordered_and_afterwards_all_is_well(tmp_path: Path) -> None:
+    order = ("/api/items/Kitchen_Light/command", {"value": "ON"})
+    with ExitStack() as stack:
+        try:
+            broker = stack.enter_context(mosquitto.private(tmp_path / "mosquitto", anonymous=True))
+        except peers.Missing as missing:
+            pytest.skip(str(missing))
+        down = stack.pop_all()
+        settings = BusSettings(port=broker.port)
+        with service(configured(tmp_path, broker.port), settings, tmp_path) as url, Browser(url) as person:
+            try:
+                peers.wait_until(lambda: person.get("/api/broker").json()["online"], "the broker", 30.0)
+                assert person.post(*order).status_code == 202
+            finally:
+                down.close()
+            peers.wait_until(lambda: not person.get("/api/broker").json()["online"], "the end of the broker", 30.0)
+            answer = person.post(*order)
+            assert (answer.status_code, answer.json()) == (503, {"error": "the broker is away"})
+            with mosquitto.private(tmp_path / "mosquitto", port=broker.port, anonymous=True):
+                peers.wait_until(lambda: person.get("/api/broker").json()["online"], "the broker again", 30.0)
+                assert person.post(*order).status_code == 202

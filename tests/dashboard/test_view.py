@@ -33,9 +33,9 @@ def test_the_first_change_after_a_pause_goes_out_at_once_and_the_next_ones_toget
 
 def test_of_events_all_are_told() -> None:
     view = View()
-    for state in ("accepted", "running", "done"):
-        view.take(said("camera/ip1/order_result", state), 100.0)
-    assert [entry.text for entry in view.batch(100.0)] == ["accepted", "running", "done"]
+    for number in range(3):
+        view.take(said("camera/ip1/audio", f'{{"file": "{number}.wav", "seconds": 1.0, "bytes": 8}}'), 100.0)
+    assert [json.loads(entry.text)["file"] for entry in view.batch(100.0)] == ["0.wav", "1.wav", "2.wav"]
 
 
 def test_messages_per_second_are_told_by_the_first_level() -> None:
@@ -47,9 +47,25 @@ def test_messages_per_second_are_told_by_the_first_level() -> None:
     assert rates == [{"home": 10.0}]
 
 
-def test_a_topic_that_nobody_knows_is_told_as_that() -> None:
-    with pytest.raises(BadMessage, match="no topic like"):
-        View().take(said("nowhere/at/all", "1"), 0.0)
+@pytest.mark.parametrize(
+    ("topic", "text", "fault"),
+    [
+        ("nowhere/at/all", "1", "no topic like"),
+        ("camera/ip1/position", '{"pan": "x"}', "pan"),
+        ("camera/ip1/places", "[", "places"),
+    ],
+)
+def test_what_is_not_as_the_table_says_never_comes_to_a_page(topic: str, text: str, fault: str) -> None:
+    view = View()
+    with pytest.raises(BadMessage, match=fault):
+        view.take(said(topic, text), 0.0)
+    assert view.due is None
+
+
+def test_a_retained_topic_that_was_taken_away_is_told_as_that() -> None:
+    view = View()
+    view.take(said("camera/ip1/marker/582", "")._replace(retain=True), 100.0)
+    assert view.batch(100.0) == (Entry("camera/ip1/marker/582", "", 0, "s"),)
 
 
 @pytest.mark.parametrize(

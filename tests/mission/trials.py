@@ -20,12 +20,12 @@ from services import topics
 from services.client import Client, connected
 from services.peers import wait_until
 from services.robot_payloads import MissionOrder, MissionResult
-from services.simulated import Parts, Simulated, parts_of, services_of
+from services.simulated import Simulated, parts_of, services_of, start_mosquitto
 from tests.trials import settled
 
 BEDROOM = {"x": 6.95, "y": 3.85, "yaw_deg": 20.0}  # map frame; the marker lies in the living room
 NEEDED = ("simulated-camera", "simulated-robot", "camera-ip1", "bridge", "mission")
-ACCIDENTS = ("none", "master", "bridge", "mission", "simulated-robot")
+ACCIDENTS = ("none", "master", "bridge", "mission", "broker", "simulated-robot")
 LONGEST_S = 240.0
 FILTERS = (
     topics.MISSION_STATE.filter,
@@ -48,11 +48,6 @@ def flat(folder: Path, start: dict[str, float]) -> Iterator[Simulated]:
 
     with parts_of(folder, real=True) as parts, services_of(folder, parts, change=change, only=NEEDED) as running:
         yield running
-
-
-def has_ros(parts: Parts) -> bool:
-    """Whether the robot can be ROS nodes here."""
-    return parts.ros is not None
 
 
 def find(running: Simulated, marker: int, accident: str) -> tuple[MissionResult, float]:
@@ -85,6 +80,10 @@ def happen(running: Simulated, accident: str) -> None:
         assert running.parts.ros is not None
         running.parts.ros.kill()
         running.parts.ros.start()
+    elif accident == "broker":
+        os.kill(running.parts.broker_pid, signal.SIGKILL)
+        running.parts.broker.close()
+        start_mosquitto(running.parts)
     else:
         os.kill(settled(running, accident), signal.SIGKILL)
 

@@ -8,7 +8,8 @@
   `robot/<robot>/goto` and `/cancel`, and says `/goto/result`, `/pose` and `/seen`.
 
 The rule of all of them: a goal lives no longer than who commands it. When the bridge ends or is killed, and when the
-bus is lost, the robot is stopped. Shared by them: `goals.py` (actionlib), `senses.py` (a process that hears and sees).
+bus is lost, the robot is stopped; so it is when the mission service has been gone for a while (`commander.py`). Shared
+by them: `goals.py` (actionlib), `senses.py` (a process that hears and sees).
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Where:
 
 def kinds() -> list[str]:
     """The robots that there is a file for."""
-    shared = ("actions", "chain", "eyes", "goals", "pipe", "senses")
+    shared = ("actions", "chain", "commander", "eyes", "goals", "pipe", "senses")
     return sorted(file.stem for file in Path(__file__).parent.glob("[a-z]*.py") if file.stem not in shared)
 
 

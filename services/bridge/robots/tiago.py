@@ -21,11 +21,12 @@ from services.bridge.node import Inlet, Node, Outlet, Ports
 from services.bridge.part import Part, status
 from services.bridge.robots import Where, actions
 from services.bridge.robots.actions import Action
+from services.bridge.robots.commander import SERVICE, Commander
 from services.bridge.robots.goals import Goals, Said, Send
 from services.bridge.robots.pipe import Felt, UnderWay, Wanted
 from services.bridge.rules import Fields, Heard
 from services.bus import Message
-from services.robot_payloads import GotoResult, RobotCancel, RobotGoto, RobotPose, RobotSeen
+from services.robot_payloads import GotoResult, MissionState, RobotCancel, RobotGoto, RobotPose, RobotSeen
 from services.section import Section
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ def _servers(settings: Settings) -> tuple[Action, ...]:
 class Tiago(Part):
     """The part. `child` runs its senses; None: it has none, as in tests."""
 
-    rows = (topics.ROBOT_GOTO, topics.ROBOT_CANCEL)
+    rows = (topics.ROBOT_GOTO, topics.ROBOT_CANCEL, topics.MISSION_STATE, topics.SERVICE_STATUS)
 
     def __init__(self, robot: str, settings: Settings, places: RobotPlaces, child: Child | None) -> None:
         self._robot, self._settings, self._places, self._child = robot, settings, places, child
@@ -143,6 +144,7 @@ class Tiago(Part):
              *(Inlet(name, "*") for name in self._result)),
         )  # fmt: skip
         self.goals = Goals(f"apartment/{robot}/")
+        self._commander = Commander()
         self._to_ros: list[Send] = []
         self._to_bus: list[GotoResult] = []
         self._told: tuple[str, str] | None = None  # the goal under way, as the senses know it
@@ -151,13 +153,17 @@ class Tiago(Part):
 
     def hear(self, heard: Heard, now: float) -> None:
         """See `Part`."""
-        if heard.levels["robot"] != self._robot:
+        if heard.levels.get("service") == SERVICE:
+            self._commander.lives(str(heard.payload), now)
+        if heard.levels.get("robot") != self._robot:
             return
         said = heard.model
         if isinstance(said, RobotGoto):
             self._take(self._go(said, now))
         elif isinstance(said, RobotCancel):
             self._take(self._stop(said))
+        elif isinstance(said, MissionState):
+            self._commander.orders(said)
         self.due = now
 
     def lost(self, now: float) -> None:
@@ -178,6 +184,8 @@ class Tiago(Part):
         goal = self.goals.goal
         if goal is not None:
             self._take(self.goals.tick(now, listens=node.listeners(goal.action.goal) > 0))
+            if self._commander.is_gone(goal.id, now):
+                self._take(self.goals.cancel(goal.id, "the mission service is gone, so that nobody follows the robot"))
         if self._child is not None and self.goals.under_way != self._told:
             self._told = self.goals.under_way
             self._child.tell(UnderWay(self._told))

@@ -82,7 +82,7 @@ class Door:
             return fault(401, "wrong name or password")
         house.tries.right(f"user {name}")
         house.tries.right(where)
-        house.sessions.end(asked.request.scope.get("token"))
+        house.sessions.end(asked.token)
         token = secrets.token_urlsafe(32)
         session = house.sessions.begin(token, secrets.token_urlsafe(24), name, user.role, now)
         told = Told(user=name, role=session.role, csrf=session.csrf, login=True)
@@ -94,7 +94,7 @@ class Door:
 
     async def logout(self, asked: Asked) -> Response:
         """Ends the session."""
-        self.house.sessions.end(asked.request.scope.get("token"))
+        self.house.sessions.end(asked.token)
         answer = JSONResponse(Told(user=None, role=None, csrf=None, login=bool(self.house.config.users)).model_dump())
         answer.delete_cookie(
             cookie_name(self.house), path="/", secure=self.house.config.tls is not None, httponly=True,

@@ -44,6 +44,12 @@ class Asked:
     session: Session
     body: Any
 
+    @property
+    def token(self) -> str | None:
+        """The session's secret, as the cookie has it."""
+        token = self.request.scope.get("token")
+        return token if isinstance(token, str) else None
+
     def path(self, name: str) -> str:
         """A parameter of the path."""
         return str(self.request.path_params[name])
@@ -78,6 +84,8 @@ def serving(endpoint: Endpoint, house: House) -> Callable[[Request], Awaitable[R
     """The endpoint as Starlette calls it: our errors become answers."""
 
     async def serve(request: Request) -> Response:
+        if request.method == "HEAD":
+            return fault(405, "ask by GET", {"allow": "GET"})  # a stream without a body would go on unseen
         session = request.scope["session"]
         if (refused := _refused(endpoint.who, session)) is not None:
             return refused

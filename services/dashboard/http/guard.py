@@ -116,5 +116,7 @@ def _is_here(scope: Scope, headers: Headers) -> bool:
     """Whether the one who asks sits at this machine; who comes through a proxy does not."""
     if "x-forwarded-for" in headers or "forwarded" in headers:
         return False
-    client = scope.get("client")
-    return client is not None and ip_address(str(client[0]).partition("%")[0]).is_loopback
+    if not (client := scope.get("client")):
+        return False
+    address = ip_address(str(client[0]).partition("%")[0])
+    return (getattr(address, "ipv4_mapped", None) or address).is_loopback

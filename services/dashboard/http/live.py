@@ -57,7 +57,8 @@ def endpoints(house: House) -> list[Endpoint]:
     async def live(asked: Asked) -> Response:
         if house.hub.pages >= MOST_PAGES:
             raise Unavailable("too many pages are open")
-        return StreamingResponse(house.hub.batches(_filters(asked)), 200, STREAM, "text/event-stream")
+        batches = house.while_logged_in(asked.token, house.hub.batches(_filters(asked)))
+        return StreamingResponse(batches, 200, STREAM, "text/event-stream")
 
     async def places(asked: Asked) -> BaseModel:
         text = house.latest(topics.CAMERA_PLACES.name(cam=asked.path("camera")))

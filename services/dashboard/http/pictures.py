@@ -34,7 +34,7 @@ def endpoints(house: House) -> list[Endpoint]:
         return str(json.loads(text)["url"])
 
     async def stream(asked: Asked) -> Response:
-        pictures = await videos.watch(address(asked))
+        pictures = house.while_logged_in(asked.token, await videos.watch(address(asked)))
         return StreamingResponse(pictures, 200, {"cache-control": "no-store"}, MIXED)
 
     async def snapshot(asked: Asked) -> Response:

@@ -20,9 +20,8 @@ LENGTH = re.compile(rb"content-length:\s*(\d{1,8})", re.I)
 LARGEST = 4 * 1024 * 1024
 FIRST_S = 5.0  # until the first picture
 QUIET_S = 12.0  # without a picture the stream ends, and the page tries again
-LINGER_S = 2.0  # after the last viewer: one who changes views comes back
+LINGER_S = 5.0  # after somebody last asked for a picture: one who changes views comes back
 SNAPSHOT_S = 25.0  # the camera may take 20 s
-VIEWERS = 40
 
 
 class Video:
@@ -30,15 +29,16 @@ class Video:
 
     def __init__(self, url: str) -> None:
         self.url = url
-        self.viewers = 0
         self.picture: bytes | None = None
         self.number = 0
         self.ended = ""
+        self._asked = asyncio.get_running_loop().time()
         self._changed = asyncio.Condition()
         self.task = asyncio.create_task(self._fetch())
 
     async def after(self, number: int, timeout_s: float) -> tuple[int, bytes]:
         """The newest picture, when it is newer than that number; Unavailable when there will be none."""
+        self._asked = asyncio.get_running_loop().time()
         try:
             async with asyncio.timeout(timeout_s), self._changed:
                 await self._changed.wait_for(lambda: self.number > number or self.ended)
@@ -59,7 +59,7 @@ class Video:
         except httpx.HTTPError as error:
             self.ended = f"the camera service does not answer: {type(error).__name__}"
         finally:
-            self.ended = self.ended or "nobody looks"
+            self.ended = self.ended or "nobody looked"
             with suppress(asyncio.CancelledError):
                 async with self._changed:
                     self._changed.notify_all()
@@ -72,7 +72,7 @@ class Video:
                 self.picture, self.number = found, self.number + 1
                 async with self._changed:
                     self._changed.notify_all()
-            if len(data) > LARGEST:
+            if len(data) > LARGEST or asyncio.get_running_loop().time() - self._asked > LINGER_S:
                 return
 
 
@@ -87,14 +87,7 @@ class Videos:
         video = self._open.get(url)
         if video is None or video.ended:
             video = self._open[url] = Video(url)
-        if video.viewers >= VIEWERS:
-            raise Unavailable("too many viewers")
-        video.viewers += 1
-        try:
-            number, picture = await video.after(0, FIRST_S)
-        except BaseException:
-            self._left(video)
-            raise
+        number, picture = await video.after(0, FIRST_S)
         return self._parts(video, number, picture)
 
     async def _parts(self, video: Video, number: int, picture: bytes) -> AsyncIterator[bytes]:
@@ -107,8 +100,6 @@ class Videos:
                 number, picture = await video.after(number, QUIET_S)
         except Unavailable:
             return  # the page sees the end, and asks again
-        finally:
-            self._left(video)
 
     async def snapshot(self, url: str) -> bytes:
         """One picture; Unavailable when there is none."""
@@ -127,17 +118,6 @@ class Videos:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-
-    def _left(self, video: Video) -> None:
-        video.viewers -= 1
-        if not video.viewers:
-            asyncio.get_running_loop().call_later(LINGER_S, self._end_if_alone, video)
-
-    def _end_if_alone(self, video: Video) -> None:
-        if not video.viewers:
-            video.task.cancel()
-            if self._open.get(video.url) is video:
-                del self._open[video.url]
 
 
 def _client(timeout_s: float = QUIET_S) -> httpx.AsyncClient:

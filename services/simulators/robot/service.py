@@ -45,7 +45,7 @@ class Config(Section):
     seed: int = 1
     fails: int = Field(default=0, ge=0)  # so many goals fail first, as when somebody stands in the way
     on_bus: bool = True  # false: real ROS nodes (`nodes.py`), and the bridge speaks for them
-    fps: float = Field(default=4.0, gt=0, le=30)  # of the camera of those
+    fps: float = Field(default=2.5, gt=0, le=30)  # of the camera of those
 
 
 @contextmanager

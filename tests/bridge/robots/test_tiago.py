@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from services.bridge import Config
 from services.bridge.program import check
 from services.bridge.robots import kinds
+from services.bridge.robots.commander import GONE_S
 from services.bridge.robots.goals import AGAIN_S, FORGOTTEN_S, SILENT_S, TAKEN_S
 from services.bridge.robots.tiago import DICTIONARY, Settings, Tiago
 from services.bridge.rules import read
@@ -210,6 +211,31 @@ def test_the_goal_of_a_lost_bus_is_cancelled(robot: Robot) -> None:
     assert state == "g cancelled"
     assert "the bus was lost" in reason
     assert robot.cancels() == [("/move_base/cancel", f"{OURS}g")]
+
+
+@pytest.mark.parametrize(
+    ("goal", "back", "ends"), [("m-g3", False, True), ("m-g3", True, False), ("by-hand", False, False)]
+)
+def test_the_goal_of_a_mission_service_that_stays_away_is_cancelled(
+    robot: Robot, goal: str, back: bool, ends: bool
+) -> None:
+    state = {"state": "go", "id": "m", "since": "2026-01-31T07:05:00Z"}
+    hears(robot, "mission/tiago/state", json.dumps(state))
+    robot.says("goto", x=0.0, y=0.0, id=goal)
+    robot.status((f"{OURS}{goal}", ACTIVE))
+    hears(robot, "service/mission/status", "offline")
+    for _ in range(round(GONE_S)):
+        robot.tick(1.0)
+        robot.status((f"{OURS}{goal}", ACTIVE))
+        if back:
+            hears(robot, "service/mission/status", "online")
+    robot.tick(0.1)
+    assert (robot.part.goals.under_way is None) is ends
+    assert set(robot.cancels()) == ({("/move_base/cancel", f"{OURS}{goal}")} if ends else set())
+
+
+def hears(robot: Robot, topic: str, payload: str) -> None:
+    robot.part.hear(read(Message(topic, payload.encode(), received=robot.now), robot.now), robot.now)
 
 
 def test_another_robots_orders_are_not_ours(robot: Robot) -> None:

@@ -1,0 +1,15 @@
+"""What nearly every command has: the screen, the configuration file, data instead of text, leave to move."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+CONFIG = Path("config/apartment.yaml")
+Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
+Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
+YesMove = Annotated[bool, typer.Option("--yes-move", help="It may move; else the terminal is asked.")]
+out = Console(soft_wrap=True, highlight=False)
