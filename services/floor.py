@@ -69,11 +69,6 @@ class Grid:
         distance: NDArray[np.float64] = np.sqrt(np.array(squared)[1:-1, 1:-1]) * self.resolution
         return np.where(self.cells == FREE, distance, 0.0)
 
-    def clear(self, x: float, y: float, radius: float) -> bool:
-        """Whether a disc around a point lies in free cells."""
-        row, column = self.cell(x, y)
-        return self.inside(row, column) and bool(self.clearance[row, column] >= radius + 0.71 * self.resolution)
-
     def reachable(self, start: XY, radius: float) -> NDArray[np.bool_]:
         """The cells that the middle of a disc can come to from `start`, by cells that share an edge.
 

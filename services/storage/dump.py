@@ -47,7 +47,10 @@ TABLES = (
         ("started", "ended"),
     ),
     Table(
-        "mission", ("mission", "robot", "marker", "state", "reason", "started", "ended"), ("mission",),
+        "mission",
+        ("mission", "robot", "marker", "state", "reason", "place", "x", "y", "z", "seen_by", "started", "ended",
+         "story"),
+        ("mission",),
         ("started", "ended"),
     ),
     Table("camera_order", ("order_id", "camera", "name", "value", "state", "error", "at"), ("order_id",), ("at",)),

@@ -13,6 +13,9 @@ from services.storage import TIMES, Item, Mission, Sample, Storage
 from services.storage.mysql_text import MICROSECONDS, moment
 
 SECOND = 1_000_000
+YEAR_0_TO_1970_S = (
+    62_167_219_200  # TO_SECONDS counts whole ones, in UTC as our sessions do; UNIX_TIMESTAMP slow decimals
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +188,7 @@ def _from_means(storage: Storage, item: Item, since: int, until: int, every_s: i
 def _from_samples(storage: Storage, item: Item, since: int, until: int, every_s: int) -> list[Bucket]:
     sql = DIALECTS[storage.dialect]
     group = {
-        "mysql": f"UNIX_TIMESTAMP(s.time) DIV {every_s} * {every_s}",
+        "mysql": f"(TO_SECONDS(s.time) - {YEAR_0_TO_1970_S}) DIV {every_s} * {every_s}",
         "sqlite": f"s.time / {every_s * SECOND} * {every_s}",
     }[storage.dialect]
     rows = storage.read(

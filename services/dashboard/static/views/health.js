@@ -91,7 +91,11 @@ export function show(root) {
   };
 
   const draw = () => {
-    if (!tree.contains(document.activeElement) || !document.activeElement.matches(":focus-visible")) drawTree();
+    const focused = tree.contains(document.activeElement) ? document.activeElement : null;
+    if (!focused?.matches(":focus-visible")) { // a screen reader would be told the same again and again
+      drawTree();
+      if (focused) tree.querySelector(`[data-path="${CSS.escape(focused.dataset.path)}"]`)?.focus();
+    }
     drawServices();
   };
   draw();

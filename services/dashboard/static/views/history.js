@@ -89,6 +89,7 @@ export function show(root, { apartment }) {
     plots.replaceChildren();
     for (const one of found.filter((series) => series.fault)) plots.append(h("p", { class: "why" }, `${one.item}: ${one.fault}`));
     await drawNumbers(found.filter((one) => !one.fault && NUMBERS.has(apartment.items[one.item].type)), names, mine);
+    if (mine !== turn) return;
     const states = found.filter((one) => !one.fault && !NUMBERS.has(apartment.items[one.item].type));
     plots.append(...states.map((one) => strip(one, apartment.items[one.item].label, since, until)));
     if (!names.length) plots.append(h("p", { class: "empty" }, "Choose items to see what was."));
@@ -103,6 +104,7 @@ export function show(root, { apartment }) {
         plots.append(h("p", { class: "empty" }, `Nothing was stored of ${series.map((one) => apartment.items[one.item].label).join(", ")} in this span.`));
         continue;
       }
+      if (mine !== turn) return;
       const place = h("div", { class: "plot", role: "img", "aria-label": `Plot of ${some.map((one) => apartment.items[one.item].label).join(", ")}` });
       plots.append(place);
       const told = some.map((one) => ({ ...one, label: apartment.items[one.item].label, index: names.indexOf(one.item) }));
