@@ -34,6 +34,7 @@ CORE = (
 FILES_OF_OURS = ("services.document", "services.secret_store")  # reading YAML, finding secrets
 SHELL = ("services.config", "services.registry", "services.runner", "services.aside", "services.process")
 BUSES = ("services.bus.mqtt", "services.bus.memory", "services.bus.connection", "services.bus.outbox")
+THE_FLAT = ("services.vision", "services.floor", "services.robot_places")  # where what is
 ROS_GRAPH = ("services.ros_master", "services.ros_node")
 SERVICE = (*CORE, "services.runner", "services.document")  # they meet on the bus, never in an import
 LAYERS: dict[str, tuple[str, ...]] = {
@@ -47,6 +48,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.robot_payloads": ("services.errors", "services.payloads"),
     "services.floor": (*WORDS, "services.document"),
     "services.robot_places": (*WORDS, "services.document", "services.floor"),
+    "services.camera_sections": ("services.section", "services.vision"),
     "services.topic": (*WORDS, "services.bus", "services.payloads"),
     "services.topics": (*WORDS, "services.bus", "services.payloads", "services.robot_payloads", "services.topic"),
     "services.bus.mqtt": (*CORE, "services.bus.connection", "services.bus.outbox"),
@@ -66,15 +68,15 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
     "services.runner": (*CORE, "services.aside"),
     "services.camera": (*SERVICE, "services.vision"),
-    "services.bridge": (*SERVICE, *ROS_GRAPH, "services.vision", "services.floor", "services.robot_places"),
+    "services.bridge": (*SERVICE, *ROS_GRAPH, *THE_FLAT, "services.camera_sections"),
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage"),
     "services.openhab": SERVICE,
     "services.hubs": SERVICE,
     "services.metrics": SERVICE,
     "services.mission": (*SERVICE, "services.floor", "services.robot_places"),
-    "services.dashboard": (*SERVICE, "services.vision", "services.floor", "services.robot_places"),
-    "services.simulators": (*SERVICE, *ROS_GRAPH, "services.vision", "services.floor", "services.robot_places"),
+    "services.dashboard": (*SERVICE, *THE_FLAT, "services.camera_sections"),
+    "services.simulators": (*SERVICE, *ROS_GRAPH, *THE_FLAT),
     "services.process": (*CORE, *BUSES, *SHELL, "services.access"),
     "services.doctor": ("services",),
     "services.backup": (*CORE, *SHELL, "services.storage"),

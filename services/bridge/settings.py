@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, field_validator
 
 from services.bridge.robots import Robot
+from services.camera_sections import CameraSections
 from services.home import Home
 from services.section import Section
 from services.topic import LEVELS
-from services.vision.frames import Mount
-
-
-class Hung(Section):
-    """How a camera hangs, as the bridge reads it from that camera's own section; faults in it are told there."""
-
-    model_config = {"extra": "ignore"}
-
-    mount: Mount | None = None
-    camera_info: Path | None = None
 
 
 class Config(Section):
@@ -39,7 +29,7 @@ class Config(Section):
     name: str = "bridge"
     home: Home
     cameras: tuple[str, ...] = ()
-    camera_sections: dict[str, Hung] = {}
+    camera_sections: CameraSections = {}
     folder: Path
     state: Path | None = None
 
@@ -49,13 +39,3 @@ class Config(Section):
         """Two files that say where the apartment lies would come to differ."""
         if value is not None:
             raise ValueError(f"expected places: FILE, whose apartment_to_map says it for all, got {value!r}")
-
-    @field_validator("camera_sections", mode="before")
-    @classmethod
-    def what_can_be_understood(cls, sections: Any) -> dict[str, Hung]:
-        """The rest is not ours: the password above all."""
-        found = {}
-        for cam, section in sections.items() if isinstance(sections, dict) else ():
-            with suppress(ValidationError):
-                found[str(cam)] = Hung.model_validate(section)
-        return found

@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-from services.dashboard import passwords
-
 app = typer.Typer(no_args_is_help=True, help="Who may open the dashboard.")
 SHORTEST = 8
 
@@ -24,6 +22,8 @@ def user(
     role: Annotated[str, typer.Option(help="viewer (looks only) or operator.")] = "viewer",
 ) -> None:
     """Ask for a password and print the line for `dashboard.users`: the hash alone stands there."""
+    from services.dashboard import passwords  # for this command alone
+
     if role not in ("viewer", "operator"):
         raise typer.BadParameter(f"expected viewer or operator, got {role!r}")
     password = _asked()

@@ -14,14 +14,14 @@ from typing import Any
 from pydantic import ValidationError
 
 from services import document, robot_places
+from services.camera_sections import Hung
 from services.dashboard import chart
-from services.dashboard.settings import Config, Hung
+from services.dashboard.settings import Config
 from services.errors import ConfigError
 from services.floor import Grid
 from services.home import Home
 from services.section import Section
 from services.states import base_type
-from services.vision.frames import Mount
 from services.vision.lens import Lens
 
 XY = tuple[float, float]
@@ -136,7 +136,7 @@ def _cameras(config: Config) -> Iterator[dict[str, Any]]:
     for name in config.cameras:
         section = config.camera_sections.get(name, Hung())
         told: dict[str, Any] = {"name": name, "targets": section.targets, "mount": None, "lens": None}
-        mount, lens = mount_of(section), lens_of(config.folder, section)
+        mount, lens = section.mount, lens_of(config.folder, section)
         if mount is not None:
             told["mount"] = {
                 key: asdict(mount)[key] for key in ("position", "kind", "yaw_deg", "tilt_zero_deg", "sensor_roll_deg")
@@ -148,14 +148,6 @@ def _cameras(config: Config) -> Iterator[dict[str, Any]]:
                 "up_deg": degrees(2 * atan(lens.height / 2 / float(lens.matrix[1, 1]))),
             }  # fmt: skip
         yield told
-
-
-def mount_of(section: Hung) -> Mount | None:
-    """How a camera hangs, where its section says so rightly (the camera's own check tells faults)."""
-    try:
-        return Mount(**section.mount) if section.mount else None
-    except TypeError:
-        return None
 
 
 def lens_of(folder: Path, section: Hung) -> Lens | None:

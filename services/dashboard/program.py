@@ -37,7 +37,7 @@ def _sights(config: Config) -> dict[str, Sight]:
     """The cameras whose picture can be clicked at: those whose mount and lens are known."""
     found = {}
     for name, section in config.camera_sections.items():
-        mount, lens = plan.mount_of(section), plan.lens_of(config.folder, section)
+        mount, lens = section.mount, plan.lens_of(config.folder, section)
         if mount is not None and lens is not None:
             found[name] = Sight(mount, lens, tuple(plan.levels_of(config.folder, section)))
     return found

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import Field, SecretStr, ValidationError, field_validator
+from pydantic import Field, SecretStr, field_validator
 
+from services.camera_sections import CameraSections
 from services.dashboard import passwords
 from services.home import Home
 from services.section import Section
@@ -42,16 +42,6 @@ class RobotSettings(Section):
     places: Path
 
 
-class Hung(Section):
-    """How a camera hangs, as its own section says; faults in it are told there."""
-
-    model_config = {"extra": "ignore"}
-
-    mount: dict[str, Any] | None = None
-    camera_info: Path | None = None
-    targets: tuple[int, ...] = ()
-
-
 class Config(Section):
     """`name`, `home`, `cameras`, `camera_sections`, `folder` and `state` are given by the program."""
 
@@ -66,16 +56,6 @@ class Config(Section):
     name: str = "dashboard"
     home: Home
     cameras: tuple[str, ...] = ()
-    camera_sections: dict[str, Hung] = {}
+    camera_sections: CameraSections = {}
     folder: Path = Path()
     state: Path | None = None
-
-    @field_validator("camera_sections", mode="before")
-    @classmethod
-    def what_can_be_understood(cls, sections: Any) -> dict[str, Hung]:
-        """The rest is not ours: the password above all."""
-        found = {}
-        for cam, section in sections.items() if isinstance(sections, dict) else ():
-            with suppress(ValidationError):
-                found[str(cam)] = Hung.model_validate(section)
-        return found
