@@ -1,4 +1,4 @@
-"""What other services read of a camera's section: how it hangs and what it looks for. Its own check tells faults there."""
+"""What others read of a camera's section: how it hangs, what it looks for. Its own check tells the faults there."""
 
 from __future__ import annotations
 
