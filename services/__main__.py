@@ -18,7 +18,20 @@ from rich.table import Table
 
 from services import access, client, process, secret_store, topics
 from services.bus import Message
-from services.command_line import backup, calibrate, dashboard, doctor, install, mission, openhab, secrets, stored
+from services.command_line import (
+    backup,
+    calibrate,
+    dashboard,
+    doctor,
+    install,
+    mission,
+    openhab,
+    record,
+    replay,
+    secrets,
+    stored,
+    watch,
+)
 from services.command_line.options import CONFIG, Config, Json, out
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
@@ -200,6 +213,9 @@ app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
 app.command(epilog="Example: apartment restore apartment.zip")(backup.restore)
 app.command(epilog="Example: apartment doctor")(doctor.doctor)
 app.command(epilog="Example: apartment install --dry-run")(install.install)
+app.command(epilog="Example: apartment watch 'camera/#' 'home/+/state'")(watch.watch)
+app.command(epilog="Example: apartment record evening.jsonl.gz 'home/#' 'camera/#'")(record.record)
+app.command(epilog="Example: apartment replay evening.jsonl.gz --speed 10 --only 'home/+/state'")(replay.replay)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(dashboard.app, name="dashboard")
 app.add_typer(mission.app, name="mission")

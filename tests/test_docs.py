@@ -81,6 +81,9 @@ def test_the_example_test_of_the_readme_runs(pytester: pytest.Pytester, simulate
         "install",
         "backup",
         "restore",
+        "watch",
+        "record",
+        "replay",
         "secrets init",
     ],
 )
