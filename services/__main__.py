@@ -10,11 +10,10 @@ import signal
 import sys
 from json import dumps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from services import access, client, process, secret_store, topics
 from services.bus import Message
@@ -29,6 +28,7 @@ from services.command_line import (
     record,
     replay,
     secrets,
+    status,
     stored,
     watch,
 )
@@ -43,7 +43,6 @@ app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
     help="A smart apartment, its ceiling camera and a ROS 1 robot on one MQTT event bus.",
 )  # fmt: skip
-STATUS_S = 1.0  # how long retained states may take to come
 err = Console(stderr=True, soft_wrap=True, highlight=False)
 
 
@@ -122,21 +121,6 @@ def topics_(
         _say(page.markdown())
 
 
-@app.command(epilog="Example: apartment status --json")
-def status(config: Config = CONFIG, json: Json = False) -> None:
-    """Show which services are online, since when and what they counted."""
-    apartment = load(config)
-    filters = (topics.SERVICE_STATUS.filter, topics.SERVICE_INFO.filter)
-    with client.connected(apartment.bus, filters) as bus:
-        rows = _status_rows(apartment, bus.collect(STATUS_S))
-    if json:
-        out.print_json(data=rows)
-    else:
-        _show_status(rows)
-    if any(row["status"] != "online" for row in rows.values()):
-        raise typer.Exit(1)
-
-
 @app.command(epilog="Example: apartment order ip1 Goto Kitchen")
 def order(
     camera: str, key: str, value: Annotated[str, typer.Argument()] = "", config: Config = CONFIG, json: Json = False
@@ -213,6 +197,7 @@ app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
 app.command(epilog="Example: apartment restore apartment.zip")(backup.restore)
 app.command(epilog="Example: apartment doctor")(doctor.doctor)
 app.command(epilog="Example: apartment install --dry-run")(install.install)
+app.command(epilog="Example: apartment status --live")(status.status)
 app.command(epilog="Example: apartment watch 'camera/#' 'home/+/state'")(watch.watch)
 app.command(epilog="Example: apartment record evening.jsonl.gz 'home/#' 'camera/#'")(record.record)
 app.command(epilog="Example: apartment replay evening.jsonl.gz --speed 10 --only 'home/+/state'")(replay.replay)
@@ -233,29 +218,6 @@ def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:
 
 def _say(text: str) -> None:
     print(text, flush=True)
-
-
-def _status_rows(apartment: Apartment, seen: list[Message]) -> dict[str, dict[str, Any]]:
-    rows: dict[str, dict[str, Any]] = {
-        name: {"status": "never seen", "info": None} for name, one in apartment.instances.items() if one.row.on_bus
-    }
-    for message in seen:
-        known = topics.read(message, message.received)
-        row = rows.setdefault(known.levels["service"], {"status": "never seen", "info": None})
-        if known.topic is topics.SERVICE_STATUS:
-            row["status"] = known.payload
-        else:
-            row["info"] = known.payload.model_dump()
-    return rows
-
-
-def _show_status(rows: dict[str, dict[str, Any]]) -> None:
-    table = Table("service", "status", "since", "received", "published", "bad")
-    for name, row in sorted(rows.items()):
-        info = row["info"] or {"started": "", "counters": {}}
-        counted = [f"{info['counters'].get(key, 0):.0f}" for key in ("received", "published", "bad")]
-        table.add_row(name, row["status"], info["started"], *counted)
-    out.print(table)
 
 
 def _tell_order(result: OrderResult) -> None:

@@ -58,10 +58,10 @@ def _show(message: Message, zone: tzinfo) -> None:
 def text_of(message: Message, zone: tzinfo) -> Text:
     """One line: time in that zone, R where it was retained, topic, payload; JSON in colours."""
     when = datetime.fromtimestamp(message.received, zone)
-    text = Text(f"{when:%H:%M:%S}.{when.microsecond // 1000:03d} ", style="dim")
+    text = Text().append(f"{when:%H:%M:%S}.{when.microsecond // 1000:03d} ", style="dim")
     text.append("R " if message.retain else "  ", style="magenta")
     text.append(f"{printable(message.topic)} ", style="bold")
-    payload = Text(short(message.payload), style="not bold")
+    payload = Text(short(message.payload))
     if _is_json(message.payload):
         COLOURED.highlight(payload)
     return text.append_text(payload)

@@ -47,6 +47,12 @@ class Terminal:
         """The next line that it prints."""
         return self.lines.get(timeout=LIMIT_S)
 
+    def ready(self) -> str:
+        """The READY line; what it logs before is read over."""
+        while not (line := self.line()).startswith("READY "):
+            pass
+        return line
+
     def ended(self, number: int | None = None) -> int:
         """Its exit code, after a signal where one is given."""
         if number is not None:
