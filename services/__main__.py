@@ -20,6 +20,7 @@ from services.bus import Message
 from services.command_line import (
     backup,
     calibrate,
+    completion,
     dashboard,
     doctor,
     install,
@@ -32,7 +33,7 @@ from services.command_line import (
     stored,
     watch,
 )
-from services.command_line.options import CONFIG, Config, Json, out
+from services.command_line.options import CONFIG, SERVICES, Camera, Config, Json, out
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
@@ -47,7 +48,7 @@ err = Console(stderr=True, soft_wrap=True, highlight=False)
 
 
 @app.command(epilog="Example: apartment run --config config/simulated.yaml")
-def run(services: Annotated[list[str] | None, typer.Argument()] = None, config: Config = CONFIG) -> None:
+def run(services: Annotated[list[str] | None, SERVICES] = None, config: Config = CONFIG) -> None:
     """Start services (all that the configuration has), one process each, and keep them running."""
     process.log_to_stderr()
     apartment = load(config, tuple(services) if services else None, deep=True)
@@ -58,7 +59,7 @@ def run(services: Annotated[list[str] | None, typer.Argument()] = None, config: 
 
 
 @app.command(epilog="Example: apartment serve bridge")
-def serve(services: list[str], config: Config = CONFIG) -> None:
+def serve(services: Annotated[list[str], SERVICES], config: Config = CONFIG) -> None:
     """Run services in this process, one mostly: what `run` and systemd start."""
     process.log_to_stderr()
     apartment = load(config, tuple(services))
@@ -123,7 +124,11 @@ def topics_(
 
 @app.command(epilog="Example: apartment order ip1 Goto Kitchen")
 def order(
-    camera: str, key: str, value: Annotated[str, typer.Argument()] = "", config: Config = CONFIG, json: Json = False
+    camera: Camera,
+    key: Annotated[str, typer.Argument(autocompletion=completion.order_keys)],
+    value: Annotated[str, typer.Argument()] = "",
+    config: Config = CONFIG,
+    json: Json = False,
 ) -> None:
     """Give a camera an order and wait until it is done."""
     with client.connected(load(config).bus, (topics.CAMERA_ORDER_RESULT.filter,)) as bus:
@@ -132,8 +137,8 @@ def order(
 
 @app.command(epilog="Example: apartment scan ip1 --target 582")
 def scan(
-    camera: str,
-    target: Annotated[list[int], typer.Option(help="A marker; repeat for more.")],
+    camera: Camera,
+    target: Annotated[list[int], typer.Option(help="A marker; repeat for more.", autocompletion=completion.markers)],
     full: Annotated[bool, typer.Option("--full", help="Every place, in both picture modes.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw a plan with what was found into this PNG file.")] = None,
     world: Annotated[Path | None, typer.Option(help="The file with the rooms; default: the simulated one.")] = None,
@@ -197,6 +202,7 @@ app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
 app.command(epilog="Example: apartment restore apartment.zip")(backup.restore)
 app.command(epilog="Example: apartment doctor")(doctor.doctor)
 app.command(epilog="Example: apartment install --dry-run")(install.install)
+app.command(epilog="Example: apartment completion bash >> ~/.bashrc")(completion.completion)
 app.command(epilog="Example: apartment status --live")(status.status)
 app.command(epilog="Example: apartment watch 'camera/#' 'home/+/state'")(watch.watch)
 app.command(epilog="Example: apartment record evening.jsonl.gz 'home/#' 'camera/#'")(record.record)
@@ -237,6 +243,7 @@ def main() -> None:
         from services.bridge import arguments  # roslaunch starts us
 
         sys.argv[1:] = arguments.take(sys.argv[1:])
+    completion.prepare()
     try:
         app(standalone_mode=True)
     except ConfigError as error:

@@ -84,6 +84,7 @@ def test_the_example_test_of_the_readme_runs(pytester: pytest.Pytester, simulate
         "watch",
         "record",
         "replay",
+        "completion",
         "secrets init",
     ],
 )

@@ -22,7 +22,7 @@ from services import client, document
 from services.client import Client
 from services.command_line import prints
 from services.command_line.calibrate_map import map_
-from services.command_line.options import CONFIG, Config, YesMove, out
+from services.command_line.options import CONFIG, Camera, Config, YesMove, out
 from services.command_line.prints import Book, Inner, Kind, Side, Squares, squares_of
 from services.command_line.zoom import zoom
 from services.config import Apartment, load
@@ -42,7 +42,7 @@ app.command("map", epilog="Example: apartment calibrate map --pair 0,0=1.5,-0.8 
 
 
 @app.command(epilog="Example: apartment calibrate ptz ip1 --yes-move")
-def ptz(camera: str, yes_move: YesMove = False, config: Config = CONFIG) -> None:
+def ptz(camera: Camera, yes_move: YesMove = False, config: Config = CONFIG) -> None:
     """Turn a camera with every speed and keep what that teaches: speeds, delays, accelerations, smallest step."""
     from services.camera.ptz import command  # for this command alone
 
@@ -58,7 +58,7 @@ def ptz(camera: str, yes_move: YesMove = False, config: Config = CONFIG) -> None
 
 @app.command(epilog="Example: apartment calibrate lens ip1 --squares 9x6 --square 30 --out lens.html")
 def lens(
-    camera: str,
+    camera: Camera,
     board: Kind = "charuco",
     squares: Squares = "9x6",
     square: Side = 30.0,
@@ -83,7 +83,7 @@ def lens(
 
 @app.command(epilog="Example: apartment calibrate mount ip1 --at 582=3.90,4.52,0.46 --at 17=1.80,4.14,0.92")
 def mount(
-    camera: str,
+    camera: Camera,
     at: Annotated[list[str] | None, typer.Option("--at", help="ID=X,Y,Z of a marker's centre, m; repeat.")] = None,
     doubt_mm: Annotated[float, typer.Option("--doubt", help="How well that was measured, mm.")] = 10.0,
     keep: Annotated[bool, typer.Option("--keep", help="Leave the configuration file as it is.")] = False,

@@ -9,12 +9,16 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
+import typer
+
 from services import client
 from services.bus import Message
+from services.command_line import completion
 from services.config import BusSettings
 from services.errors import ConfigError
 
 LONGEST_FILTER = 1000  # bytes; MQTT has 65,535
+FILTERS = typer.Argument(help="'camera/#', 'home/+/state'; all when none.", autocompletion=completion.filters)
 GLANCE_S = 0.2  # a signal that comes while Python is about to wait is seen at the end of the wait only
 
 

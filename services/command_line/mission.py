@@ -15,7 +15,7 @@ from rich.table import Table
 from services import client
 from services.bus import Message
 from services.client import Client
-from services.command_line.options import CONFIG, Config, Json, out
+from services.command_line.options import CONFIG, Config, Json, Marker, out
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.robot_payloads import MissionOrder, MissionResult, MissionState, Where, WhereReply
@@ -31,7 +31,7 @@ Tell = Callable[[str], None]
 
 @app.command(epilog="Example: apartment mission find 582")
 def find(
-    marker: int,
+    marker: Marker,
     robot: Robot = None,
     timeout_s: Annotated[float, typer.Option("--timeout", help="Seconds to wait for the end.")] = 1800.0,
     plot: Annotated[Path | None, typer.Option(help="Draw what happened into this PNG file.")] = None,
@@ -59,7 +59,7 @@ def cancel(robot: Robot = None, config: Config = CONFIG) -> None:
 
 @app.command(epilog="Example: apartment mission where 582")
 def where(
-    marker: int,
+    marker: Marker,
     robot: Robot = None,
     wait: Annotated[bool, typer.Option("--wait", help="For the house to look again, where that is long ago.")] = False,
     config: Config = CONFIG,

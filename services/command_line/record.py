@@ -26,7 +26,7 @@ MEGABYTE = 1_000_000
 
 def record(
     file: Annotated[Path, typer.Argument(help="A new file; packed when its name ends in .gz.")],
-    filters: Annotated[list[str] | None, typer.Argument(help="'camera/#', 'home/+/state'; all when none.")] = None,
+    filters: Annotated[list[str] | None, hearing.FILTERS] = None,
     seconds: Annotated[float | None, typer.Option("--for", min=0.0, help="End after so many seconds.")] = None,
     pictures: Annotated[bool, typer.Option("--pictures", help="Pictures too.")] = False,
     limit: Annotated[float, typer.Option(min=0.001, help="End when so many megabytes are written, unpacked.")] = 500.0,

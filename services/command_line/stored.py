@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from pydantic import ValidationError
 
+from services.command_line import completion
 from services.command_line.options import CONFIG, Config, Json
 from services.config import Apartment, load
 from services.errors import ConfigError
@@ -39,7 +40,9 @@ def add_to(app: typer.Typer) -> None:
 
 
 def history(
-    item: Annotated[str, typer.Argument(help="An item; needless for --what changes or missions.")] = "",
+    item: Annotated[
+        str, typer.Argument(help="An item; needless for --what changes or missions.", autocompletion=completion.items)
+    ] = "",
     what: Annotated[
         str, typer.Option(help="samples, last, changes, durations (time in each state) or missions.")
     ] = "samples",

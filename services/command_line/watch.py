@@ -23,7 +23,7 @@ COLOURED = JSONHighlighter()
 
 
 def watch(
-    filters: Annotated[list[str] | None, typer.Argument(help="'camera/#', 'home/+/state'; all when none.")] = None,
+    filters: Annotated[list[str] | None, hearing.FILTERS] = None,
     count: Annotated[int | None, typer.Option(min=1, help="End after so many; exit 1 when fewer came.")] = None,
     seconds: Annotated[float | None, typer.Option("--for", min=0.0, help="End after so many seconds.")] = None,
     config: Config = CONFIG,

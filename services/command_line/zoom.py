@@ -10,7 +10,7 @@ from rich.table import Table
 
 from services import client, topics
 from services.bus import Message
-from services.command_line.options import CONFIG, Config, YesMove, out
+from services.command_line.options import CONFIG, Camera, Config, YesMove, out
 from services.config import load
 from services.errors import ConfigError
 from services.payloads import Calibration, OrderResult
@@ -22,7 +22,7 @@ ASK = (
 
 
 def zoom(
-    camera: str,
+    camera: Camera,
     yes_move: YesMove = False,
     config: Config = CONFIG,
 ) -> None:
