@@ -30,6 +30,7 @@ from services.command_line import (
     replay,
     secrets,
     status,
+    steer,
     stored,
     watch,
 )
@@ -204,6 +205,8 @@ app.command(epilog="Example: apartment doctor")(doctor.doctor)
 app.command(epilog="Example: apartment install --dry-run")(install.install)
 app.command(epilog="Example: apartment completion bash >> ~/.bashrc")(completion.completion)
 app.command(epilog="Example: apartment status --live")(status.status)
+app.command(epilog="Example: apartment log camera-ip1 debug")(steer.log)
+app.command(epilog="Example: apartment reload camera-ip1")(steer.reload)
 app.command(epilog="Example: apartment watch 'camera/#' 'home/+/state'")(watch.watch)
 app.command(epilog="Example: apartment record evening.jsonl.gz 'home/#' 'camera/#'")(record.record)
 app.command(epilog="Example: apartment replay evening.jsonl.gz --speed 10 --only 'home/+/state'")(replay.replay)

@@ -47,7 +47,7 @@ def _rights(account: str, cameras: list[str]) -> list[str]:
     rows: dict[str, str] = {}
     for topic in TABLE:
         writes, reads = _may(account, topic.writers), _may(account, topic.readers)
-        if writes or reads or "<service>" in topic.writers:
+        if writes or reads or "<service>" in (*topic.writers, *topic.readers):
             _add(rows, account, topic, writes=writes, reads=reads)
     reply = f"topic {'readwrite' if account == 'operator' else 'write'} reply/#"
     own = ["topic read $SYS/broker/#"] if account == "persistence" else []  # whether the broker dropped something
@@ -61,6 +61,9 @@ def _add(rows: dict[str, str], account: str, topic: Topic, *, writes: bool, read
         rows[topic.filter_for(service=account)] = "write"
         if reads:
             rows[topic.filter] = "read"
+        return
+    if "<service>" in topic.readers and not writes:
+        rows[topic.filter_for(service=account)] = "read"
         return
     own = {"cam": camera} if camera and "cam" in topic.names else {}
     right = "readwrite" if writes and reads else "write" if writes else "read"

@@ -30,6 +30,7 @@ from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.config import Apartment, BusSettings, Instance, Tls
 from services.runner import Runner
+from services.steering import Steered
 from services.topics import SERVICE_STATUS
 
 LONGEST_WAIT_S = 1.0
@@ -139,7 +140,9 @@ def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event,
     threading.Thread(target=_wake, args=(bus, stopping), daemon=True, name="stop").start()
     try:
         with importlib.import_module(row.module).start(instance.config, bus.post) as service:
-            runner = Runner(name, service, bus, time.time, Aside(apartment.state / name / "aside"))
+            runner = Runner(
+                name, Steered(name, service, stopping.set), bus, time.time, Aside(apartment.state / name / "aside")
+            )
             _turns(runner, stopping, lambda: ready(name, dict(getattr(service, "addresses", {}))))
     finally:
         bus.close()

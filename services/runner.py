@@ -34,7 +34,11 @@ class Service(Protocol):
     """
 
     subscribes: tuple[str, ...]
-    due: float | None  # when tick is wanted next; None: only after a message
+
+    @property
+    def due(self) -> float | None:
+        """When tick is wanted next; None: only after a message."""
+        ...
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
         """Takes one message and yields what is to be published."""

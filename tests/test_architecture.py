@@ -77,7 +77,8 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.mission": (*SERVICE, "services.floor", "services.robot_places"),
     "services.dashboard": (*SERVICE, *THE_FLAT, "services.camera_sections"),
     "services.simulators": (*SERVICE, *ROS_GRAPH, *THE_FLAT),
-    "services.process": (*CORE, *BUSES, *SHELL, "services.access"),
+    "services.steering": (*CORE, "services.runner"),
+    "services.process": (*CORE, *BUSES, *SHELL, "services.access", "services.steering"),
     "services.doctor": ("services",),
     "services.backup": (*CORE, *SHELL, "services.storage"),
     "services.installation": (

@@ -85,6 +85,8 @@ def test_the_example_test_of_the_readme_runs(pytester: pytest.Pytester, simulate
         "record",
         "replay",
         "completion",
+        "log",
+        "reload",
         "secrets init",
     ],
 )

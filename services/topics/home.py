@@ -42,6 +42,22 @@ SERVICE_INFO = Topic(
     (*SHOWN, "metrics"),
     "version, start and counters",
 )
+SERVICE_LOG_LEVEL = Topic(
+    "service/<service>/log_level/set",
+    Kind.COMMAND,
+    str,
+    ("operator",),
+    ("<service>",),
+    "`debug`, `info`, `warning` or `error`, until it ends; its `info` tells the level among the counters",
+)
+SERVICE_RELOAD = Topic(
+    "service/<service>/reload/set",
+    Kind.COMMAND,
+    str,
+    ("operator",),
+    ("<service>",),
+    "end in good order, to be started again with the configuration as it is then",
+)
 DIAGNOSTICS = Topic(
     "diagnostics/<component>",
     Kind.STATE,
