@@ -55,7 +55,7 @@ def status(
     if json:
         out.print_json(data=data(standing))
     else:
-        out.print(screen(standing, zone), width=None if out.is_terminal else WIDE)
+        out.print(screen(standing, zone), width=None if out.is_terminal else WIDE, crop=False)
     if not standing.well:
         raise typer.Exit(1)
 

@@ -22,7 +22,7 @@ from services.payloads import ServiceInfo
 from services.steering import LEVELS
 from services.topics import SERVICE_INFO, SERVICE_LOG_LEVEL, SERVICE_RELOAD, SERVICE_STATUS
 
-KNOWN_S = 5.0  # until what is retained of the service is here
+KNOWN_S = 10.0  # until what is retained of the service is here
 TOLD_S = 15.0  # its next info comes within 5 s
 AGAIN_S = 60.0  # systemd waits 2 s, and a small machine imports OpenCV for some more
 Service = Annotated[str, typer.Argument(autocompletion=completion.on_bus)]

@@ -9,7 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from services.__main__ import app
+from services.errors import ConfigError
 from services.simulated import CONFIG
 from tests.command_line.terminal import LIMIT_S, ROOT
 
@@ -24,7 +27,6 @@ LINES = {
     f"apartment order {SIMULATED} i": {"ip1"},
     f"apartment scan {SIMULATED} ip1 --target 5": {"582"},
     f"apartment history {SIMULATED} Kitchen_Li": {"Kitchen_Light"},
-    "apartment order ip1 Aud": {"AudioRec", "AudioPlay"},
     "apartment watch robot/+/go": {"robot/+/goto", "robot/+/goto/result"},
     "apartment order ": set(),  # no configuration here: nothing, and no word about it
 }
@@ -55,17 +57,10 @@ def test_bash_completes_what_the_configuration_has(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("shell", "words"), [("zsh", "compdef"), ("fish", "complete --command apartment")])
 def test_other_shells_have_a_script(shell: str, words: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "services", "completion", shell],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=2 * LIMIT_S,
-    )
-    assert (done.returncode, words in done.stdout) == (0, True)
+    done = CliRunner().invoke(app, ["completion", shell])
+    assert (done.exit_code, words in done.stdout) == (0, True)
     assert "_APARTMENT_COMPLETE" in done.stdout
 
 
 def test_an_unknown_shell_is_refused() -> None:
-    done = subprocess.run([sys.executable, "-m", "services", "completion", "csh"], cwd=ROOT, capture_output=True)
-    assert done.returncode == 2
+    assert isinstance(CliRunner().invoke(app, ["completion", "csh"]).exception, ConfigError)

@@ -50,7 +50,8 @@ def test_a_rate_comes_from_two_live_diagnostics() -> None:
     assert not standing.settled
     standing.hear(said(diagnostic("service/bridge", 150), 1.1))
     assert standing.settled
-    assert data(standing)["services"]["bridge"]["rates"] == {"received": 50.0, "published": 100.0}
+    row = json.loads(json.dumps(data(standing)))["services"]["bridge"]
+    assert (row["status"], row["rates"]) == ("online", {"received": 50.0, "published": 100.0})
 
 
 def test_a_service_that_is_away_is_not_waited_for_but_told() -> None:
@@ -101,14 +102,10 @@ def test_status_shows_what_runs(mosquitto_broker: Broker, tmp_path: Path) -> Non
     with apartment(config, "serve", "hubs") as serving, somebody(mosquitto_broker, "service/#", "diagnostics/#") as bus:
         assert serving.ready()
         bus.until(lambda one: one.topic == "diagnostics/service/hubs", 30.0)
-        code, text = done(config, "status", "--json")
-        assert code == 0, text
-        row = json.loads(text)["services"]["hubs"]
-        assert (row["status"], set(row["rates"])) == ("online", {"received", "published"})
-        assert row["info"]["version"]
         code, text = done(config, "status")
         assert code == 0, text
-        assert "received/s" in text
+        assert all(words in text for words in ("hubs", "online", "received/s", "running"))
+        assert text.count("\n") < 20
 
 
 def test_a_live_screen_wants_a_terminal(mosquitto_broker: Broker, tmp_path: Path) -> None:
