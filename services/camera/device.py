@@ -121,6 +121,14 @@ class Lane:
         self._waiting = sorted(waiting for waiting in self._waiting if waiting.rank is not Rank.MOVE)
         return dropped
 
+    def _in_vain(self, error: Away) -> None:
+        """The camera was lost while it turned: whoever waits learns it now, so that he who turns it asks for a stop."""
+        with self._changed:
+            dropped = [waiting for waiting in self._waiting if waiting.rank is not Rank.STOP]
+            self._waiting = sorted(waiting for waiting in self._waiting if waiting.rank is Rank.STOP)
+        for waiting in dropped:
+            self._answer(waiting, None, error, self.clock())
+
     def _run(self) -> None:
         while (waiting := self._next()) is not None:
             sent = self.clock()
@@ -130,6 +138,7 @@ class Lane:
                 if isinstance(error, Away) and self.started:
                     self._others_at = self.clock() + STOP_ALONE_S
                     self.owing(True)
+                    self._in_vain(error)
                 elif isinstance(waiting.request, Stop):
                     self.owing(False)  # it has arrived, whatever the camera thinks of it
                 self._answer(waiting, None, error, sent)

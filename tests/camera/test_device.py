@@ -128,6 +128,27 @@ def test_a_camera_that_is_lost_while_it_turns_is_owed_a_stop_until_one_has_arriv
     sender.close()
 
 
+def test_who_waits_for_a_camera_that_is_lost_while_it_turns_learns_it_and_the_stop_goes_first() -> None:
+    control, pictures = Slow(deaf=1), Slow()
+    sender, inbox = device(control, pictures)
+    control.leave.set()
+    sender.submit(Start(Direction.LEFT), 1)
+    assert reply(inbox).error is None
+    control.leave.clear()
+    sender.submit(Stop(), 2)  # its answer is lost; whoever asked for the next two has not heard of that
+    while not isinstance(control.entered.get(timeout=WAIT_S), Stop):
+        pass
+    sender.submit(Status(), 3)
+    sender.submit(Status(), 4)
+    control.leave.set()
+    told = [reply(inbox) for _ in range(3)]
+    assert {one.ticket: type(one.error) for one in told} == {2: Away, 3: Away, 4: Away}
+    sender.submit(Stop(), 5)
+    assert reply(inbox).ticket == 5
+    sender.close()
+    assert [type(request) for request in control.got] == [Start, Stop, Stop]
+
+
 def test_what_the_firmware_drives_by_itself_is_ended_by_a_start_that_can_be_stopped() -> None:
     camera = Slow()
     camera.leave.set()

@@ -122,15 +122,18 @@ class Try:
 
     def __init__(self, gate: Gate, number: int, *, doubted: bool) -> None:
         self._gate, self._number = gate, number
+        self.answered = False
         self.doubted = doubted  # one has failed: another with an old nonce would prove nothing, and is one too many
 
     def passed(self) -> None:
         """The camera knows us (it may refuse what was asked, for want of rights)."""
+        self.answered = True
         with self._gate.changed:
             self._gate.book.passed(self._number, self._gate.clock())
 
     def failed(self, *, sure: bool = False) -> None:
         """The camera does not; `sure` when this was a repeat after ODD_S with a new challenge."""
+        self.answered = True
         with self._gate.changed:
             self._gate.book.failed(self._gate.clock(), sure=sure)
 
@@ -198,13 +201,13 @@ class Gate:
                 raise Away("other logins to this camera have no answer yet")
             number = self.book.tries(urgent=urgent)
             doubted = self.book.failures > 0
-        answered = False
+        login = Try(self, number, doubted=doubted)
         try:
-            yield Try(self, number, doubted=doubted)
-            answered = True
+            yield login
+            login.answered = True  # with anything else: a nonce that was too old, another status
         finally:
             with self.changed:
-                self.book.back(urgent=urgent, answered=answered)
+                self.book.back(urgent=urgent, answered=login.answered)
                 self.changed.notify_all()
 
     def _open(self, urgent: bool) -> bool:
