@@ -62,9 +62,10 @@ def _add(rows: dict[str, str], account: str, topic: Topic, *, writes: bool, read
         if reads:
             rows[topic.filter] = "read"
         return
-    if "<service>" in topic.readers and not writes:
+    if "<service>" in topic.readers:
         rows[topic.filter_for(service=account)] = "read"
-        return
+        if not writes:
+            return
     own = {"cam": camera} if camera and "cam" in topic.names else {}
     right = "readwrite" if writes and reads else "write" if writes else "read"
     rows.update(dict.fromkeys(topic.filters_for(**own), right))
