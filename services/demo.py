@@ -38,7 +38,7 @@ def demo(out: Console, *, once: bool) -> bool:
     """Runs it; True when the marker was found at its place, within WITHIN_M of where it is, and is in the database."""
     with tempfile.TemporaryDirectory(prefix="apartment-") as name, ExitStack() as stack:
         with out.status("Starting broker, database and ROS master ..."):
-            parts = stack.enter_context(parts_of(Path(name), real=True))
+            parts = stack.enter_context(parts_of(Path(name), real=True, usual_ports=True))
         _show_parts(out, parts)
         with out.status("Starting the services ..."):
             running = stack.enter_context(services_of(Path(name), parts))

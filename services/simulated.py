@@ -78,16 +78,18 @@ class Simulated:
 
 
 @contextmanager
-def parts_of(folder: Path, *, real: bool) -> Iterator[Parts]:
-    """Starts the peers; they end with the block."""
+def parts_of(folder: Path, *, real: bool, usual_ports: bool = False) -> Iterator[Parts]:
+    """Starts the peers; they end with the block. `usual_ports`: broker and page where people look, if they are free."""
     folder.mkdir(parents=True, exist_ok=True)
     parts = Parts(folder)
     parts.environment["APARTMENT_STATE"] = str(folder / "state")
     parts.environment["APARTMENT_CAMERA_PORT"] = str(free_port())
     parts.environment["APARTMENT_CAMERA_RTSP_PORT"] = str(free_port())
     parts.environment["APARTMENT_SIDE_DOOR_PORT"] = str(free_port())
-    taken = not real or answers(USUAL_DASHBOARD_PORT)
-    parts.environment["APARTMENT_DASHBOARD_PORT"] = "0" if taken else str(USUAL_DASHBOARD_PORT)
+    page = USUAL_DASHBOARD_PORT if usual_ports and not answers(USUAL_DASHBOARD_PORT) else 0
+    parts.environment["APARTMENT_DASHBOARD_PORT"] = str(page)
+    broker = USUAL_BROKER_PORT if usual_ports and not answers(USUAL_BROKER_PORT) else free_port()
+    parts.environment["APARTMENT_BROKER_PORT"] = str(broker)
     with ExitStack() as stack:
         for start in (_start_broker, _start_database, _start_ros):
             start(stack, parts, real)
@@ -125,8 +127,7 @@ def services_of(
 
 
 def _start_broker(stack: ExitStack, parts: Parts, real: bool) -> None:
-    port = free_port() if answers(USUAL_BROKER_PORT) or not real else USUAL_BROKER_PORT
-    parts.environment["APARTMENT_BROKER_PORT"] = str(port)
+    port = int(parts.environment["APARTMENT_BROKER_PORT"])
     stack.enter_context(parts.broker)
     try:
         _only_if(real, "mosquitto")
