@@ -13,6 +13,7 @@ import typer
 from rich.highlighter import JSONHighlighter
 from rich.text import Text
 
+from services import process
 from services.bus import Message
 from services.command_line import hearing, recording
 from services.command_line.options import CONFIG, Config, Json, out
@@ -34,9 +35,9 @@ def watch(
     First comes what the broker retains, marked R. --json: one object a line, as in a recording.
     """
     wanted, apartment = hearing.checked(filters or ["#"]), load(config)
-    zone, left = apartment.home.zone, count
-    with hearing.listening(apartment.bus, wanted) as batches:
-        for came in batches(hearing.Stopwatch(seconds)):
+    zone, left, stopwatch = apartment.home.zone, count, hearing.Stopwatch(seconds)
+    with process.stop_signals(stopwatch.stop), hearing.listening(apartment.bus, wanted) as batches:
+        for came in batches(stopwatch):
             for message in came[:left]:
                 typer.echo(recording.line(message)) if json else _show(message, zone)
             left = None if left is None else left - len(came[:left])
