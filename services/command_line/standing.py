@@ -148,15 +148,12 @@ class Standing:
         kind, _, name = component.partition("/")
         if kind == "service" and name:
             self.services.setdefault(name, Service()).hear(said, message)
-        before = self.diagnostics.get(component)
-        if (
-            before is not None
-            and before[1].level
-            and (said.level, said.message) != (before[1].level, before[1].message)
-        ):
-            self.past.append(_trouble_of(component, *before, now=False))
-        same = before is not None and (before[1].level, before[1].message) == (said.level, said.message)
-        self.diagnostics[component] = (before[0] if before is not None and same else message.received, said)
+        since, before = self.diagnostics.get(component, (message.received, said))
+        if (before.level, before.message) != (said.level, said.message):
+            if before.level:
+                self.past.append(_trouble_of(component, since, before, now=False))
+            since = message.received
+        self.diagnostics[component] = (since, said)
 
     def _trouble(self, who: str, text: str, message: Message) -> None:
         self.past.append(Trouble(stamp(message.received), who, "error", text, now=False))

@@ -34,6 +34,7 @@ class Thumbnails:
         self.house, self.videos = house, videos
         self.folder = house.config.state / "dashboard" / "thumbnails" if house.config.state else None
         self._taken: dict[tuple[str, str], tuple[float, bytes]] = {}
+        self._asked: set[tuple[str, str]] = set()  # the disk was asked once; what comes later comes from us
         self._not_before: dict[str, float] = {}
 
     async def run(self) -> None:
@@ -60,7 +61,7 @@ class Thumbnails:
         position = Position.model_validate_json(text)
         if position.moving or position.place is None:
             return None
-        found = self._taken.get((camera, position.place)) or self._read(camera, position.place)
+        found = self._known(camera, position.place)
         return position.place if found is None or now - found[0] > AGAIN_S else None
 
     async def _take(self, camera: str, place: str) -> None:
@@ -88,7 +89,7 @@ class Thumbnails:
         text = self.house.latest(topics.CAMERA_PLACES.name(cam=camera))
         known = {}
         for place in json.loads(text) if text else ():
-            found = self._taken.get((camera, place)) or self._read(camera, place)
+            found = self._known(camera, place)
             if found is not None:
                 known[place] = round(found[0] * 1000)
         told = json.dumps(known)
@@ -99,6 +100,14 @@ class Thumbnails:
         """A place's name may hold anything, so its hash names the file."""
         name = hashlib.sha256(f"{camera}/{place}".encode()).hexdigest()[:24]
         return self.folder / f"{name}.jpg" if self.folder else None
+
+    def _known(self, camera: str, place: str) -> tuple[float, bytes] | None:
+        """When the picture of one of the camera's own places was taken, and the picture."""
+        found = self._taken.get((camera, place))
+        if found is None and (camera, place) not in self._asked:
+            self._asked.add((camera, place))
+            found = self._read(camera, place)
+        return found
 
     def _read(self, camera: str, place: str) -> tuple[float, bytes] | None:
         file = self._file(camera, place)
