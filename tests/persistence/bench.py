@@ -5,6 +5,7 @@ MariaDB writes each commit to its disk before it answers; a message is acknowled
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import statistics
@@ -178,6 +179,7 @@ class Bench:
 def rows(folder: Path, runs: int, messages: int) -> list[Row]:
     """All figures, medians of interleaved runs."""
     folder.mkdir(parents=True, exist_ok=True)
+    logging.getLogger("services").setLevel(logging.ERROR)  # the writer rightly misses its session in each fresh broker
     with ExitStack() as stack:
         bench = Bench(folder, stack.enter_context(mariadb.private(folder / "mariadb")), messages)
         for run in range(runs):
