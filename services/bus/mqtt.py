@@ -14,6 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import paho.mqtt.client as paho
@@ -56,6 +57,7 @@ class MqttBus:
         self._outbox = Outbox(self._send, birth)
         self._in_flight: dict[int, Message] = {}  # events that the broker has not acknowledged yet
         self._acknowledged: deque[int] = deque()
+        self._sessions: deque[bool] = deque(maxlen=1)  # whether the broker had kept ours; until it is told
         self._to_acknowledge: deque[Delivery] = deque()
         self._client: paho.Client | None = None
         self._network = Network()
@@ -86,6 +88,7 @@ class MqttBus:
         self._filters = (*self._filters, *filters)
         if self._up and self._client is not None:
             self._subscribe(self._client, filters)
+            self._tell_of_session()
 
     def publish(self, message: Message) -> None:
         """See `Bus`."""
@@ -134,6 +137,12 @@ class MqttBus:
 
     # -- the service's thread, inside
 
+    def _tell_of_session(self) -> None:
+        """From either thread, once for each connection: a service may subscribe after the first is made."""
+        if SESSION_TOPIC in self._filters:
+            with suppress(IndexError):  # it is told
+                self.post(Message(SESSION_TOPIC, value=self._sessions.pop()))
+
     def _keep_up(self) -> None:
         self._forget_acknowledged()
         up = self._up
@@ -156,16 +165,10 @@ class MqttBus:
         client = self._client
         if client is None:
             return False
-        info = client.publish(
-            message.topic,
-            message.payload,
-            qos=message.qos,
-            retain=message.retain,
-            properties=connection.properties(message, self._protocol),
-        )
-        if info.rc == MQTTErrorCode.MQTT_ERR_QUEUE_SIZE or (
-            info.rc == MQTTErrorCode.MQTT_ERR_NO_CONN and message.qos == 0
-        ):
+        properties = connection.properties(message, self._protocol)
+        info = client.publish(message.topic, message.payload, message.qos, message.retain, properties)
+        no_connection = info.rc == MQTTErrorCode.MQTT_ERR_NO_CONN
+        if info.rc == MQTTErrorCode.MQTT_ERR_QUEUE_SIZE or (no_connection and message.qos == 0):
             return False
         if message.qos and not message.expires_s and (not message.retain or message.once):
             self._in_flight[info.mid] = message
@@ -251,8 +254,8 @@ class MqttBus:
         self.connections += 1
         self._up = self.connections  # before the filters are read: what is asked for meanwhile sees that it is up
         self._subscribe(client, self._filters)
-        if SESSION_TOPIC in self._filters:
-            self.post(Message(SESSION_TOPIC, value=bool(flags.session_present)))
+        self._sessions.append(bool(flags.session_present))
+        self._tell_of_session()
         self._inbox.put(WAKE)
 
     def _subscribe(self, client: paho.Client, filters: Sequence[str]) -> None:

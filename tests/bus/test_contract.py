@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from services import peers
-from services.bus import LOST_TOPIC, Message, topic_matches
+from services.bus import LOST_TOPIC, SESSION_TOPIC, Message, topic_matches
 from services.bus.memory import Hub, MemoryBus
 from services.bus.mqtt import Address, MqttBus
 from services.peers import embedded, free_port, mosquitto
@@ -310,6 +310,17 @@ def test_a_durable_client_gets_what_it_has_not_acknowledged_again(kit: Kit) -> N
     assert (again[0].token.packet, again[0].token.again) == (held[0].token.packet, True)
 
 
+@pytest.mark.mosquitto
+def test_who_subscribes_after_the_connection_is_made_is_told_of_the_session(mosquitto_broker: mosquitto.Broker) -> None:
+    for kept in (False, True):
+        bus = MqttBus(Address("durable", port=mosquitto_broker.port, protocol=4, durable=True))
+        until(lambda: bus.connected, bus)  # noqa: B023
+        bus.subscribe([SESSION_TOPIC, "reply/#"])
+        told = until(lambda: bus.receive(0.05), bus)  # noqa: B023
+        assert [(one.topic, one.value) for one in told] == [(SESSION_TOPIC, kept)]
+        bus.close()
+
+
 def test_response_topic_and_correlation_travel_where_the_broker_knows_them(kit: Kit) -> None:
     speaker, listener = kit.client("speaker"), kit.client("listener")
     listen(listener, "reply/#")
@@ -326,7 +337,8 @@ def test_response_topic_and_correlation_travel_where_the_broker_knows_them(kit: 
     [
         ("a/b", "a/b", True), ("a/b", "a/b/c", False), ("a/+", "a/b", True), ("a/+", "a", False), ("a/+", "a/", True),
         ("+/b", "a/b", True), ("#", "a/b", True), ("#", "$SYS/x", False), ("+/x", "$SYS/x", False), ("a/#", "a", True),
-        ("a/#", "a/b/c", True), ("a/#", "b", False), ("$SYS/#", "$SYS/x", True), ("a/+/c", "a/b/c", True),
+        ("a/#", "a/b/c", True), ("a/#", "b", False), ("$SYS/#", "$SYS/x", True),
+        ("$share/g/a/+", "a/b", True), ("$share/g/a/+", "b/b", False), ("a/+/c", "a/b/c", True),
     ],
 )  # fmt: skip
 def test_filters_match_as_mqtt_says(topic_filter: str, topic: str, matches: bool) -> None:

@@ -30,6 +30,7 @@ ITEMS = 100
 RATE = 2000  # messages a second
 BURST = 20
 DRAINED_S = 120.0
+HEARD_S = 5.0
 
 
 class Publisher:
@@ -178,10 +179,11 @@ def site(folder: Path) -> Iterator[Site]:
 
 
 def _is_heard(one: Site) -> bool:
-    """Whether what is said is stored: before the first subscription nobody is owed anything."""
+    """Whether all that is said is stored: before the first subscription nobody is owed anything."""
+    began = time.time()
     with Publisher(one.broker.port) as publisher:
         publisher.go_on(BURST)
-    return bool(one.rows(0.0))
+    return not _drained(one, began, publisher.acknowledged, HEARD_S)[0]
 
 
 def kill_writer(one: Site, publisher: Publisher, rng: random.Random) -> None:
@@ -236,7 +238,9 @@ def trouble(one: Site, rng: random.Random, what: Trouble | None = None) -> int:
     return len(publisher.acknowledged)
 
 
-def _drained(one: Site, since: float, acknowledged: set[int]) -> tuple[set[int], list[tuple[str, int]]]:
+def _drained(
+    one: Site, since: float, acknowledged: set[int], within_s: float = DRAINED_S
+) -> tuple[set[int], list[tuple[str, int]]]:
     """What is missing in the end, and all rows; waits for what is still on its way."""
     found: list[list[tuple[str, int]]] = [[]]
 
@@ -246,7 +250,7 @@ def _drained(one: Site, since: float, acknowledged: set[int]) -> tuple[set[int],
         return not acknowledged - {number for _, number in found[0]}
 
     with suppress(TimeoutError):
-        peers.wait_until(complete, "every row", DRAINED_S)
+        peers.wait_until(complete, "every row", within_s)
     return acknowledged - {number for _, number in found[0]}, found[0]
 
 
