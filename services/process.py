@@ -23,7 +23,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from services.access import write_private
 from services.aside import Aside
 from services.bus import WAKE_TOPIC, Message
 from services.bus.connection import Address
@@ -32,6 +31,7 @@ from services.config import Apartment, BusSettings, Instance, Tls
 from services.runner import Runner
 from services.steering import Steered
 from services.topics import SERVICE_STATUS
+from services.whole_file import write_private
 
 LONGEST_WAIT_S = 1.0
 SIGNAL_S = 0.2  # a signal that comes while Python is about to wait is seen at the end of the wait only

@@ -30,6 +30,7 @@ CORE = (
     "services.topic",
     "services.topics",
     "services.home",
+    "services.whole_file",
 )
 FILES_OF_OURS = ("services.document", "services.secret_store")  # reading YAML, finding secrets
 SHELL = ("services.config", "services.registry", "services.runner", "services.aside", "services.process")
@@ -40,6 +41,7 @@ SERVICE = (*CORE, "services.runner", "services.document")  # they meet on the bu
 LAYERS: dict[str, tuple[str, ...]] = {
     "services": (),
     "services.errors": (),
+    "services.whole_file": (),
     "services.section": ("services.errors",),
     "services.states": ("services.errors",),
     "services.payloads": ("services.errors",),
@@ -59,7 +61,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.ros_node": ("services.errors", "services.ros_master"),
     "services.vision": ("services.errors",),
     "services.storage": ("services.errors", "services.section"),
-    "services.document": ("services.errors",),
+    "services.document": ("services.errors", "services.whole_file"),
     "services.secret_store": ("services.errors", "services.document"),
     "services.registry": (),
     "services.access": (*CORE, "services.registry"),

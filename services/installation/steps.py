@@ -20,6 +20,7 @@ from services.credentials.folder import Folder, fill
 from services.errors import ApartmentError, ConfigError
 from services.installation import units
 from services.installation.layout import BROKER, DATABASE, GROUP, STATE, SYSTEM, TARGET, UNITS, parts
+from services.whole_file import write_private
 
 SECRETS = SYSTEM / "secrets"
 BROKER_FILES = ("passwords", "acl", "server.crt", "server.key")
@@ -119,7 +120,7 @@ def do(step: Step, root: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     if step.path.parent in (BROKER, DATABASE):
         file.parent.chmod(0o700)
-    access.write_private(file, step.text)
+    write_private(file, step.text)
     if step.owner and root == Path("/") and os.geteuid() == 0:
         user, _, group = step.owner.partition(":")
         if user and not _is_user(user):

@@ -19,6 +19,7 @@ from services.dashboard.thumbnail import smaller
 from services.dashboard.view import Entry
 from services.errors import Unavailable
 from services.payloads import Position
+from services.whole_file import write_whole
 
 log = logging.getLogger(__name__)
 TOPIC = "/dashboard/thumbnails/"  # our own: the places of a camera that have one, and since when (ms)
@@ -121,9 +122,6 @@ class Thumbnails:
         if file is None:
             return
         try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            beside = file.with_suffix(".new")
-            beside.write_bytes(small)
-            beside.replace(file)
+            write_whole(file, small)
         except OSError as error:
             log.warning("%s cannot be kept: %s", file, error)
