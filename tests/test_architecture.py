@@ -109,7 +109,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "pydantic": EVERYWHERE,
     "pydantic_core": EVERYWHERE,
     "numpy": EVERYWHERE,
-    "paho": ("services.bus.mqtt", "services.bus.connection"),
+    "paho": ("services.bus.mqtt", "services.bus.connection", "services.bus.network"),
     "amqtt": ("services.peers.embedded",),
     "httpx": (
         "services.virtual.wire",

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from services.storage.address import Address, read_address
 
@@ -31,9 +31,8 @@ class Item:
     item_id: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """One stored state: a number, a text, or both (`kind.holds` says which one is the value)."""
+class Sample(NamedTuple):
+    """One stored state: number, text or both (`kind.holds` says which one is the value). A tuple, as Message is."""
 
     item: str
     time: int
