@@ -190,7 +190,7 @@ PURE = (
     "services.camera.sound.wav", "services.camera.commands", "services.camera.errands", "services.camera.looks",
     "services.camera.upkeep", "services.camera.probe.findings", "services.camera.probe.anonymous",
     "services.camera.discovery", "services.bridge.rules", "services.bridge.frames", "services.bridge.multipart",
-    "services.bridge.confirm", "services.bridge.pace", "services.bridge.robots.actions",
+    "services.bridge.confirm", "services.bridge.limits", "services.bridge.pace", "services.bridge.robots.actions",
     "services.bridge.robots.chain", "services.bridge.robots.commander", "services.bridge.robots.goals",
     "services.bridge.items", "services.bridge.template",
     "services.persistence.rows", "services.persistence.seen", "services.persistence.strategies",
