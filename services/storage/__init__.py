@@ -276,8 +276,9 @@ def open_plain(address: Address) -> Storage:
 
 
 def open_ready(address: Address) -> Storage:
-    """Opens it as somebody who is not the writer: nothing is made, learnt or brought up to date, no rights are needed for
-    that. The calls of `open_plain` work, and those that read. Unavailable until the writer has made the tables ready.
+    """Opens it as somebody who is not the writer: nothing is made, learnt or brought up to date.
+
+    The calls of `open_plain` work, and those that read. Unavailable until the writer has made the tables ready.
     """
     storage = open_plain(address)
     try:

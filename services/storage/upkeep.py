@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 from services.errors import ConfigError
 from services.storage import Address, Storage, open_plain, open_storage
@@ -20,14 +21,18 @@ KEEPING = {"": "SELECT", "sample": "DELETE", "summary": "INSERT, UPDATE, DELETE"
 VIEW_RIGHTS = "SELECT, CREATE VIEW, SHOW VIEW, DROP"
 ACCOUNT = re.compile(r"[A-Za-z0-9_-]{1,32}")
 HOST = re.compile(r"[A-Za-z0-9_.:%/-]{1,255}")
+SOCKETS = ("/run/mysqld/mysqld.sock", "/var/lib/mysql/mysql.sock")  # Debian, others: the administrator comes by it
 LOCAL = ("localhost", "127.0.0.1", "::1")
 
 
 def administrator(address: Address, user: str, password: str | None) -> Address:
-    """The same server, as somebody who may make databases and accounts."""
+    """The same server, as somebody who may make databases and accounts; without a password by the server's socket."""
     if address.dialect == "sqlite":
         raise ConfigError(["a SQLite file has no accounts: who may read the file may read all of it"])
-    return replace(address, user=user, password=password, database="")
+    socket = address.socket
+    if password is None and socket is None and address.host in LOCAL:
+        socket = next((path for path in SOCKETS if Path(path).exists()), None)
+    return replace(address, user=user, password=password, database="", socket=socket)
 
 
 def make_databases(address: Address, admin: Address) -> None:

@@ -1,8 +1,8 @@
 """docs/raspberry-pi.md, followed line by line on a Debian 12 that was made a minute ago: `make soak PART=install`.
 
-mmdebstrap makes its root, systemd-nspawn boots it with the real systemd and a network of its own (loopback alone, so that
-the usual ports are free). The commands are the page's own blocks; what a person would fill in is in `FILLED`. Needs root,
-`apt-get install mmdebstrap systemd-container`, and a way to Debian's packages and the Python packages.
+mmdebstrap makes its root, systemd-nspawn boots it with the real systemd and a network of its own (loopback alone, so
+that the usual ports are free). The commands are the page's own blocks; what a person would fill in is in `FILLED`.
+Needs root, `apt-get install mmdebstrap systemd-container`, and a way to Debian's packages and the Python packages.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ FILLED = (
 SIMULATED = f"""\
 mkdir -p /srv/camera && cp -r /opt/apartment/config/. /srv/camera && cd /srv/camera
 sed -i 's/rtsp_port: .*null: no RTSP/rtsp_port: null/' simulated.yaml
-systemd-run --quiet --unit=a-camera --setenv=CAMERA_IP1_PASSWORD={PASSWORD} --setenv=APARTMENT_STATE=/srv/camera/state \\
+systemd-run --quiet --unit=a-camera --setenv=CAMERA_IP1_PASSWORD={PASSWORD} \\
+    --setenv=APARTMENT_STATE=/srv/camera/state \\
     /opt/apartment/.venv/bin/python -m services serve simulated-camera --config /srv/camera/simulated.yaml
 """
 
@@ -64,7 +65,18 @@ class Machine:
 
     def run(self, lines: str, expected: int = 0) -> str:
         """Runs lines as its administrator would; what they print."""
-        into = ["nsenter", "--target", str(self.leader), "--mount", "--uts", "--ipc", "--net", "--pid", "--root", "--wd"]
+        into = [
+            "nsenter",
+            "--target",
+            str(self.leader),
+            "--mount",
+            "--uts",
+            "--ipc",
+            "--net",
+            "--pid",
+            "--root",
+            "--wd",
+        ]
         command = [*into, "env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "HOME=/root", "LANG=C.UTF-8", "bash", "-e"]
         lines = f"cd /opt/apartment 2>/dev/null || cd /root\n{lines}\n"
         done = subprocess.run(command, input=lines, capture_output=True, text=True, timeout=LINE_S, check=False)
@@ -98,6 +110,8 @@ def make(folder: Path) -> Machine:
     download = [sys.executable, "-m", "pip", "download", "--quiet", "--dest", str(wheels), str(ROOT)]
     subprocess.run([*download, "setuptools", "wheel"], check=True)
     subprocess.run(["git", "clone", "--quiet", "--bare", str(ROOT), str(root / "srv" / "apartment.git")], check=True)
+    (root / "etc" / "hostname").write_text("fresh\n")
+    (root / "etc" / "hosts").write_text("127.0.0.1 localhost\n127.0.1.1 fresh\n::1 localhost\n")
     (root / "etc" / "pip.conf").write_text("[global]\nno-index = true\nfind-links = /srv/wheels\n")
     return Machine(root)
 
@@ -185,7 +199,9 @@ sha256sum $(find /etc/apartment -name '*.yaml' -not -path '*/secrets/*' | sort)
 """
     machine.run(f"mkdir -p /var/backups; {_called(f'backup {KEPT}')}; systemctl stop apartment.target")
     before = machine.run(look)
-    machine.run("mariadb -e 'DROP DATABASE bus; DROP DATABASE OpenHAB'; rm -r /etc/apartment/ip1 /etc/apartment/home.yaml")
+    machine.run(
+        "mariadb -e 'DROP DATABASE bus; DROP DATABASE OpenHAB'; rm -r /etc/apartment/ip1 /etc/apartment/home.yaml"
+    )
     machine.run(filled(backup))
     assert machine.run(look) == before
     assert "ON" in before
