@@ -21,6 +21,7 @@ KEEPING = {"": "SELECT", "sample": "DELETE", "summary": "INSERT, UPDATE, DELETE"
 VIEW_RIGHTS = "SELECT, CREATE VIEW, SHOW VIEW, DROP"
 ACCOUNT = re.compile(r"[A-Za-z0-9_-]{1,32}")
 HOST = re.compile(r"[A-Za-z0-9_.:%/-]{1,255}")
+ZONES = "mariadb-tzinfo-to-sql /usr/share/zoneinfo | sudo mariadb mysql"
 SOCKETS = ("/run/mysqld/mysqld.sock", "/var/lib/mysql/mysql.sock")  # Debian, others: the administrator comes by it
 LOCAL = ("localhost", "127.0.0.1", "::1")
 
@@ -126,5 +127,5 @@ def _look_at_server(storage: Storage) -> Iterator[tuple[bool, str]]:
     yield int(packet) >= 16 * 1024 * 1024, f"max_allowed_packet={packet} (16 MiB or more)"
     yield (
         zone is not None,
-        "named time zones are " + ("there" if zone else "missing: mariadb-tzinfo-to-sql | mariadb mysql"),
+        f"named time zones are {'there' if zone else f'missing: {ZONES}'}",
     )

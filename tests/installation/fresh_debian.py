@@ -27,7 +27,7 @@ from tests.small_flat import family
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "raspberry-pi.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```sh\n(.*?)^```", PAGE, re.M | re.S)
-BEYOND = ("systemd", "systemd-sysv", "dbus", "sudo", "ca-certificates")  # of any Raspberry Pi OS
+BEYOND = ("systemd", "systemd-sysv", "dbus", "sudo", "ca-certificates", "tzdata")  # of any Raspberry Pi OS
 PASSWORD = "Xk4-frog-Lamp"
 KEPT = "/var/backups/apartment.zip"
 BOOT_S, LINE_S = 180.0, 900.0
