@@ -35,6 +35,7 @@ from services.whole_file import write_private
 
 LONGEST_WAIT_S = 1.0
 SIGNAL_S = 0.2  # a signal that comes while Python is about to wait is seen at the end of the wait only
+ARENAS = 2  # of glibc's memory: many threads that wait would take many times what one needs
 SUPERVISED = "APARTMENT_SUPERVISED"  # set by the supervisor: end when it ends
 Ready = Callable[[dict[str, Any]], None]
 OneReady = Callable[[str, dict[str, Any]], None]
@@ -92,6 +93,7 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
     """
     if os.environ.get(SUPERVISED):
         _end_with_parent()
+    _few_arenas()
     addresses: dict[str, Any] = {}
 
     def one_is_ready(name: str, own: dict[str, Any]) -> None:
@@ -190,6 +192,13 @@ def _end_with_parent() -> None:
     ctypes.CDLL(None, use_errno=True).prctl(pr_set_pdeathsig, signal.SIGTERM)
     if os.getppid() != int(os.environ[SUPERVISED]):
         os.kill(os.getpid(), signal.SIGTERM)  # it died before we asked
+
+
+def _few_arenas() -> None:
+    """For this process, and for those that it starts (mallopt(3), M_ARENA_MAX); a C library without it needs none."""
+    m_arena_max = -8
+    if hasattr(library := ctypes.CDLL(None), "mallopt"):
+        library.mallopt(m_arena_max, int(os.environ.setdefault("MALLOC_ARENA_MAX", str(ARENAS))))
 
 
 def ready_line(name: str, addresses: dict[str, Any]) -> str:

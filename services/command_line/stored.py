@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import asdict
 from datetime import tzinfo
@@ -96,14 +97,36 @@ def _missions(found: list[dict[str, object]], zone: tzinfo, *, json: bool, as_cs
 
 @db.command(epilog="Example: apartment db init --admin root")
 def init(admin: Admin = "root", config: Config = CONFIG) -> None:
-    """Make the databases, the writer's account and the tables; what is there stays. A SQLite file is just made."""
+    """Make the databases, the accounts of writer, reader and keeper, and the tables; what is there stays.
+
+    A SQLite file is just made.
+    """
     from services.storage import open_storage, upkeep
 
-    address = _settings(load(config, ("persistence",))).address
-    if address.dialect == "mysql":
-        upkeep.make_databases(address, upkeep.administrator(address, admin, _admin_password()))
-    open_storage(address).close()
+    apartment = load(config, ("persistence", "history"))
+    address = _settings(apartment).address
+    if address.dialect == "sqlite":
+        open_storage(address).close()
+    else:
+        server = upkeep.administrator(address, admin, _admin_password())
+        upkeep.make_databases(address, server)
+        open_storage(address).close()
+        for other, rights in _readers(apartment, address):
+            upkeep.make_account(other, server, rights)
     _say(f"{address}: ready")
+
+
+def _readers(apartment: Apartment, writer: Address) -> Iterator[tuple[Address, Mapping[str, str]]]:
+    """Who of the section history comes under another name than the writer, and what he may do."""
+    from services import history as history_service
+    from services.storage import upkeep
+
+    settings = apartment.instances["history"].config if "history" in apartment.instances else None
+    if not isinstance(settings, history_service.Config):
+        return
+    for one, rights in ((settings.address, upkeep.READING), (settings.keeping_address, upkeep.KEEPING)):
+        if one.user != writer.user:
+            yield one, rights
 
 
 @db.command(epilog="Example: apartment db upgrade")
