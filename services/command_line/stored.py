@@ -21,7 +21,7 @@ from services.command_line import completion
 from services.command_line.options import CONFIG, Config, Json
 from services.config import Apartment, load
 from services.errors import ConfigError
-from services.payloads import HistoryGet
+from services.history_payloads import HistoryGet
 
 if TYPE_CHECKING:  # the databases' libraries, for these commands alone
     from services.persistence import Config as Persistence

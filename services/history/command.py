@@ -18,7 +18,8 @@ from datetime import datetime, tzinfo
 from services.errors import BadMessage, ConfigError
 from services.history import answers
 from services.history.plot import Curve, svg
-from services.payloads import HistoryGet, HistoryReply, seconds, stamp
+from services.history_payloads import HistoryGet, HistoryReply
+from services.payloads import seconds, stamp
 from services.storage import Address, Item, Mission, Storage, open_storage, reading
 
 UNITS_S = {"s": 1, "m": 60, "h": 3600, "d": 86_400, "w": 604_800}
