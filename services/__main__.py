@@ -19,6 +19,7 @@ from services import access, client, process, secret_store, topics
 from services.bus import Message
 from services.command_line import (
     backup,
+    bench,
     calibrate,
     completion,
     dashboard,
@@ -202,6 +203,7 @@ stored.add_to(app)
 app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
 app.command(epilog="Example: apartment restore apartment.zip")(backup.restore)
 app.command(epilog="Example: apartment doctor")(doctor.doctor)
+app.command(epilog="Example: apartment bench --part bus --runs 3")(bench.bench)
 app.command(epilog="Example: apartment install --dry-run")(install.install)
 app.command(epilog="Example: apartment completion bash >> ~/.bashrc")(completion.completion)
 app.command(epilog="Example: apartment status --live")(status.status)
