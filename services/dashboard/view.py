@@ -53,7 +53,7 @@ class View:
         cleared = message.retain and not message.payload
         row = topics.find(message.topic)[0] if cleared else topics.read(message, now).topic
         kind = KINDS[row.kind]
-        text = "" if kind == "b" else message.payload.decode("utf-8", "replace")
+        text = f"{len(message.payload):,} bytes" if kind == "b" else message.payload.decode("utf-8", "replace")
         self._counts[message.topic.partition("/")[0]] += 1
         entry = Entry(message.topic, text[:LONGEST], round(message.received * 1000), kind)
         if kind in "sb":
