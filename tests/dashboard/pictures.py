@@ -21,7 +21,7 @@ from services.config import BusSettings
 from services.simulated import Simulated, parts_of, services_of, start_mosquitto
 from services.storage import Batch, Sample, open_storage, reading
 from tests.dashboard import browser as browsers
-from tests.dashboard.browser import DESKTOP, PHONE, VIEWS, page, view
+from tests.dashboard.browser import DESKTOP, PHONE, VIEWS, WAIT_MS, page, view
 
 FORMS = {"desktop": (DESKTOP, "light"), "phone": (PHONE, "light"), "dark": (DESKTOP, "dark")}
 PLACES = ("Sofa", "TV", "Living room", "Kitchen", "Dining")
@@ -31,6 +31,7 @@ SOME_S = 0.5  # until the last picture and the fonts are there
 def main(folder: Path) -> None:
     """Takes them all."""
     folder.mkdir(parents=True, exist_ok=True)
+    expect.set_options(timeout=WAIT_MS)
     with tempfile.TemporaryDirectory(prefix="pictures-") as name, parts_of(Path(name), real=False) as parts:
         parts.broker.close()
         start_mosquitto(parts)
