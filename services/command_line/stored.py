@@ -22,7 +22,7 @@ from services.command_line import completion
 from services.command_line.options import CONFIG, Config, Json
 from services.config import Apartment, load
 from services.errors import ConfigError
-from services.payloads import HistoryGet
+from services.history_payloads import HistoryGet
 
 if TYPE_CHECKING:  # the databases' libraries, for these commands alone
     from services.persistence import Config as Persistence
@@ -36,7 +36,7 @@ db = typer.Typer(no_args_is_help=True, help="The database: make, check, upgrade,
 
 def add_to(app: typer.Typer) -> None:
     """Adds these commands to the program's."""
-    app.command(epilog="Example: apartment history Lab_Temp --since 7d --every 1h")(history)
+    app.command(epilog="Example: apartment history Lab_Temp --since 24h --plot lab.png")(history)
     app.add_typer(db, name="db")
 
 
@@ -51,7 +51,7 @@ def history(
     until: Annotated[str, typer.Option(help="The same; now when not given.")] = "",
     every: Annotated[str, typer.Option(help="Count, least, mean, greatest per 5m, 1h, 1d.")] = "",
     limit: int = 20,
-    plot: Annotated[Path | None, typer.Option(help="Draw the numbers into this SVG file.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the numbers into this PNG or SVG file.")] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="Comma-separated values.")] = False,
     config: Config = CONFIG,
     json: Json = False,
@@ -67,7 +67,9 @@ def history(
         return
     asked = _question(item, what, begin, end, command.every_s(every), limit)
     if plot is not None:
-        plot.write_text(command.as_plot(address, asked, zone), encoding="utf-8")
+        if plot.suffix not in command.SUFFIXES:
+            raise ConfigError([f"--plot: expected a file in {' or '.join(command.SUFFIXES)}, got {str(plot)!r}"])
+        plot.write_bytes(command.as_plot(address, asked, zone, plot.suffix))
         _say(f"{plot}")
         return
     reply = command.ask(address, asked)

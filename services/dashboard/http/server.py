@@ -14,7 +14,7 @@ from services.dashboard.house import House
 from services.dashboard.http.application import application
 from services.dashboard.http.connection import Listening, Visit
 from services.dashboard.view import Entry
-from services.payloads import HistoryReply
+from services.history_payloads import HistoryReply
 
 log = logging.getLogger(__name__)
 START_S = 20.0
@@ -57,6 +57,11 @@ class Server:
         """Hands over an answer of the history service; from any thread."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._house.answered, reply)
+
+    def pictured(self, camera: str, jpeg: bytes) -> None:
+        """Hands over an analysed picture of a scan; from any thread."""
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self._house.pictured, camera, jpeg)
 
     def close(self) -> None:
         """Ends every connection, and the thread."""

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 from services import topics
-from services.dashboard.house import House
+from services.dashboard.house import SNAPSHOT, House
 from services.dashboard.http.video import Videos
 from services.dashboard.thumbnail import smaller
 from services.dashboard.view import Entry
@@ -66,11 +66,11 @@ class Thumbnails:
         return position.place if found is None or now - found[0] > AGAIN_S else None
 
     async def _take(self, camera: str, place: str) -> None:
-        stream = self.house.latest(topics.CAMERA_STREAM.name(cam=camera))
-        if stream is None:
+        url = self.house.picture_of(camera, SNAPSHOT)
+        if url is None:
             return
         try:
-            data = await self.videos.snapshot(json.loads(stream)["url"].rpartition("/")[0] + "/snapshot.jpg")
+            data = await self.videos.snapshot(url)
         except Unavailable as error:
             log.info("no picture of %s at %s: %s", camera, place, error)
             self._not_before[camera] = time.time() + AFTER_FAILURE_S
