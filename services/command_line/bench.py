@@ -29,7 +29,7 @@ def bench(
 ) -> None:
     """Measure this machine: each figure beside its floor in the same run, on private brokers and databases.
 
-    A running apartment is not touched, but slowed down. All parts together take about half an hour.
+    A running apartment is not touched, but slowed down; all parts together take a while.
     """
     if not (SOURCES / "tests" / "bench.py").exists():
         raise Unavailable("the benchmarks come with the project's sources: run it there, or `make bench`")

@@ -98,7 +98,7 @@ def _read(message: Message) -> topics.Read:
 
 def table(found: Iterable[ScanResult]) -> Table:
     """Metres in the apartment; the standard deviation is that of the worst axis."""
-    made = Table("marker", "x", "y", "z", "±", "seen from", "at", "distance")
+    made = Table("marker", "x", "y", "z", "±", "seen from", "at (UTC)", "distance")
     for one in sorted(found, key=lambda result: result.marker):
         at = (f"{one.position.x:.3f} m", f"{one.position.y:.3f} m", f"{one.position.z:.3f} m") if one.position else ()
         sigma = sqrt(max(0.0, *(row[n] for n, row in enumerate(one.covariance)))) if one.covariance else None

@@ -47,6 +47,7 @@ function one(stage, camera, may, state) {
       parts[0]),
     h("div", { class: "stack" }, parts.slice(1))));
 
+  state.replaceChildren(h("span", { class: "hint" }, "Its service has said nothing yet"));
   const line = (label, value) => h("div", {}, h("dt", {}, label), h("dd", {}, value));
   stops.push(
     live.watch(at("position"), ({ json }) => where.replaceChildren(line("Pan", `${json.pan.toFixed(1)}°`), line("Tilt", `${json.tilt.toFixed(1)}°`), line("Zoom", `${json.zoom}`), line("Place", json.moving ? "moving …" : (json.place ?? "–")))),
@@ -92,7 +93,9 @@ function places(name, may, order, stops) {
       return h("li", {}, h("button", { onclick: () => order("Goto", place), disabled: !may, "aria-current": place === here ? "true" : null },
         pictures[place] ? h("img", { src: source, alt: "", loading: "lazy" }) : h("span", { class: "blank" }, icon("camera")), h("span", {}, place)));
     }));
+    if (!list.children.length) list.append(h("li", { class: "hint" }, "None saved yet"));
   };
+  draw();
   stops.push(live.watch(`camera/${name}/places`, draw), live.watch(`camera/${name}/position`, draw), live.watch(`/dashboard/thumbnails/${name}`, draw));
   const remove = h("button", { class: "quiet", onclick: () => {
     const here = live.get(`camera/${name}/position`)?.json?.place;
@@ -191,7 +194,7 @@ function sound(name, order, stops) {
 }
 
 function log(name, stops) {
-  const list = h("ol", { class: "log" });
+  const list = h("ol", { class: "log" }, h("li", { class: "hint" }, "None yet"));
   const orders = new Map();
   stops.push(live.watch(`camera/${name}/order_result`, ({ json, at }) => {
     orders.delete(json.id);

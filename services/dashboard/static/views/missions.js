@@ -27,7 +27,7 @@ function one(root, name, may) {
     api.order(`/api/missions/${name}/find`, { find: id() });
   };
   const now = h("p", { class: "now" });
-  const why = h("p", { class: "hint" });
+  const why = h("p", { class: "hint" }, "The mission service has said nothing yet.");
   const steps = h("ol", { class: "timeline" });
   const answer = h("ul", { class: "found" });
   const results = h("div", { class: "stack" });
