@@ -30,7 +30,7 @@ BLOCKS = re.findall(r"^```sh\n(.*?)^```", PAGE, re.M | re.S)
 BEYOND = ("systemd", "systemd-sysv", "dbus", "sudo", "ca-certificates", "tzdata")  # of any Raspberry Pi OS
 PASSWORD = "Xk4-frog-Lamp"
 KEPT = "/var/backups/apartment.zip"
-BOOT_S, LINE_S = 180.0, 900.0
+BOOT_S, LINE_S = 180.0, 600.0
 CONFIG = "/etc/apartment/apartment.yaml"
 APARTMENT = f"/opt/apartment/.venv/bin/apartment --config {CONFIG}"
 CAMERA = """\
@@ -185,7 +185,9 @@ until {_called("history Kitchen_Light")} | grep ON; do :; done
 READER_PASSWORD={PASSWORD} {_called("db grant grafana --host 192.0.2.%")}
 systemctl start apartment-renew.service
 test $(systemctl show -p Result --value apartment-renew.service) = success
-mosquitto_sub -u openhab -P "$word" -h localhost -p 8883 --cafile /etc/apartment/ca.crt -C 1 -t home/Kitchen_Light/state
+word=$(cat /etc/apartment/secrets/credentials/BUS_OPERATOR_PASSWORD)
+timeout 60 mosquitto_sub -u operator -P "$word" -h localhost -p 8883 --cafile /etc/apartment/ca.crt -C 1 \\
+    -t home/Kitchen_Light/state | grep ON
 test -z "$(find /etc/apartment/secrets /etc/apartment/broker -perm /077)"
 """)
 
