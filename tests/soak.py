@@ -27,6 +27,7 @@ from tests.attacks import flooding
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
 from tests.camera.scan.scenes import scan_a_scene
+from tests.installation import fresh_debian
 from tests.mission import flat_trials
 from tests.mission import trials as mission_trials
 from tests.persistence import trials as writer_trials
@@ -174,6 +175,7 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "detector": (detector_trials.in_numbers, 100, "false markers in 50 frames"),
     "flood": (flooding.floods, 5, "ms, the others' slowest of a hundred"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
+    "install": (lambda: nullcontext(fresh_debian.follow), 1, "min, docs/raspberry-pi.md on a new Debian"),
 }
 
 
