@@ -5,6 +5,8 @@ Not here: which numbers (`numbers.py`).
 
 from __future__ import annotations
 
+import logging
+import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -18,6 +20,8 @@ from services import topics
 from services.bus import Message
 from services.metrics.numbers import Known, Number
 from services.metrics.settings import Config
+
+log = logging.getLogger(__name__)
 
 MEANINGS = {
     "apartment_service_online": ("whether a service is there", ("service",)),
@@ -77,9 +81,16 @@ def start(config: Config) -> Iterator[Metrics]:
     page, registry = Page(), CollectorRegistry()
     registry.register(page)
     server, thread = start_http_server(config.port, config.host, registry)
+    server.handle_error = _told  # type: ignore[method-assign]
     try:
         yield Metrics(page, {"metrics": f"http://{config.host}:{server.server_port}/metrics"})
     finally:
         server.shutdown()
         server.server_close()
         thread.join()
+
+
+def _told(_request: Any, client_address: Any) -> None:
+    """Who went away before his answer is none of our concern; anything else is a bug, and told."""
+    if not isinstance(sys.exception(), OSError):
+        log.exception("%s could not be answered", client_address[0])
