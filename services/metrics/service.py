@@ -90,7 +90,7 @@ def start(config: Config) -> Iterator[Metrics]:
         thread.join()
 
 
-def _told(_request: Any, client_address: Any) -> None:
+def _told(request: Any, client_address: Any) -> None:
     """Who went away before his answer is none of our concern; anything else is a bug, and told."""
     if not isinstance(sys.exception(), OSError):
         log.exception("%s could not be answered", client_address[0])
