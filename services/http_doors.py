@@ -6,7 +6,9 @@ away, however steadily he sends (a "slow loris"). Not here: the dashboard's serv
 
 from __future__ import annotations
 
+import logging
 import socket
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -14,6 +16,8 @@ from socketserver import TCPServer
 from threading import Thread
 from time import monotonic
 from typing import Any
+
+log = logging.getLogger(__name__)
 
 HEAD_S = 10.0  # for a whole request
 STALLED_S = 10.0  # one who takes nothing for so long is gone
@@ -69,6 +73,11 @@ class Doors(ThreadingHTTPServer):
         finally:
             self.heard(request)
             del self._open[request]
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Who went away before his answer came is no fault of ours; anything else is, and told."""
+        if not isinstance(sys.exception(), OSError):
+            log.exception("%s could not be answered", client_address[0])
 
     def close(self) -> None:
         """Ends the port and every connection."""

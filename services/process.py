@@ -33,7 +33,10 @@ from services.steering import Steered
 from services.topics import SERVICE_STATUS
 from services.whole_file import write_private
 
+log = logging.getLogger(__name__)
+
 LONGEST_WAIT_S = 1.0
+CLOCK_BACK_S = 2.0  # a clock that is set back further ends a service, to be started again
 SIGNAL_S = 0.2  # a signal that comes while Python is about to wait is seen at the end of the wait only
 ARENAS = 2  # of glibc's memory: many threads that wait would take many times what one needs
 SUPERVISED = "APARTMENT_SUPERVISED"  # set by the supervisor: end when it ends
@@ -145,7 +148,7 @@ def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event,
             runner = Runner(
                 name, Steered(name, service, stopping.set), bus, time.time, Aside(apartment.state / name / "aside")
             )
-            _turns(runner, stopping, lambda: ready(name, dict(getattr(service, "addresses", {}))))
+            _turns(runner, stopping, Clock(), lambda: ready(name, dict(getattr(service, "addresses", {}))))
     finally:
         bus.close()
 
@@ -156,9 +159,30 @@ def _wake(bus: MqttBus, stopping: threading.Event) -> None:
     bus.post(Message(WAKE_TOPIC))
 
 
-def _turns(runner: Runner, stopping: threading.Event, ready: Callable[[], None]) -> None:
+class Clock:
+    """Notices that the wall clock is set back, as on a small machine that learns the time late.
+
+    Whatever was due would be due only when that time comes again, a motor's stop too. So the service ends in good
+    order, which stops what turns, and is started again with everything due at its time.
+    """
+
+    def __init__(self, wall: Callable[[], float] = time.time, steady: Callable[[], float] = time.monotonic) -> None:
+        self._wall, self._steady = wall, steady
+        self._ahead = wall() - steady()
+
+    def set_back(self) -> float:
+        """By how many seconds; 0 where it is not worth ending for."""
+        ahead = self._wall() - self._steady()
+        back, self._ahead = self._ahead - ahead, max(self._ahead, ahead)
+        return back if back > CLOCK_BACK_S else 0.0
+
+
+def _turns(runner: Runner, stopping: threading.Event, clock: Clock, ready: Callable[[], None]) -> None:
     told = False
     while not stopping.is_set():
+        if back := clock.set_back():
+            log.warning("%s ends, to be started again: the clock was set back by %.0f s", runner.name, back)
+            stopping.set()
         runner.turn(min(LONGEST_WAIT_S, max(0.0, runner.due - time.time())))
         if not told and runner.bus.connected:
             ready()
