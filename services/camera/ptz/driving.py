@@ -51,7 +51,7 @@ class Driving:
 
     def _late(self) -> bool:
         """Whether there is no time to try something new: one in a move, and while there are commands left."""
-        return self.drives > 0 or self.helm.left < TRY_LEFT
+        return self.drives > 1 or self.helm.left < TRY_LEFT
 
     def _arrive(self, way: own.Drive, here: Pose, begun: Reply) -> Plan[tuple[Reading, float]]:
         """Looks at the firmware's own move until it has ended; once on the way, where its speed is not known well."""
