@@ -78,7 +78,7 @@ def at_rest(
 ) -> Plan[tuple[Reading, float]]:
     """Looks until what the firmware drives has ended; `certain`: it is known exactly where that leads.
 
-    Not at the goal, but so few degrees (`about`) from where it should end, one look is enough: it has to go on anyway.
+    `about`: that is not known quite exactly, but so few degrees; there one look is enough if it tells of rest.
     """
     skill = helm.skill
     yield from wait(max(now, arrives - skill.paces[PAN].other(READ_LATE) + skill.arrives_late))
@@ -88,8 +88,9 @@ def at_rest(
         seen.append(cast(Reading, reply.result))
         pose = helm.limits.pose(seen[-1])
         off = max(abs(pose[axis] - to[axis]) for axis in (PAN, TILT))
-        there = certain and off <= NEARER_DEG and not (about and helm.moves(seen[-1]))
-        on = helm.beside(pose) and off <= about and not helm.moves(seen[-1])
+        rests = helm.tells_rest(seen[-1])
+        there = certain and off <= NEARER_DEG and (rests or not about)
+        on = helm.beside(pose) and off <= about and rests
         if there or on or (len(seen) > 1 and same(seen[-2], seen[-1])):
             break
     if certain and (there or not same(seen[0], seen[-1])):

@@ -63,6 +63,8 @@ class Helm:
         self.commands += 1
         reply = yield from ask(request)
         self.skill.timing.learn(reply.received - reply.sent)
+        if isinstance(reply.result, Reading) and reply.result.moving:
+            self.skill.says_moving = True
         return reply
 
     def start(self, levels: Levels) -> Plan[Reply]:
@@ -99,7 +101,7 @@ class Helm:
         self._see_still(reading)
         self.course.read(reply, reading)
         while self.zoom_ends is None and (
-            pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading) or self.moves(reading)
+            pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading) or self._moves(reading)
         ):
             again = yield from self.send(Status())
             before, reading, reply = reading, cast(Reading, again.result), again
@@ -146,9 +148,13 @@ class Helm:
             if self.course.told[axis]
         )
 
-    def moves(self, reading: Reading) -> bool:
+    def _moves(self, reading: Reading) -> bool:
         """Whether the camera says that it moves; some firmware says so for ever."""
         return reading.moving is True and not self.skill.always_moving
+
+    def tells_rest(self, reading: Reading) -> bool:
+        """Whether a reading tells by itself that the camera rests: its word was seen to change."""
+        return reading.moving is False and self.skill.says_moving and not self.skill.always_moving
 
     def _settled(self) -> float:
         """When a reading has to be asked for that shows everything at rest."""
