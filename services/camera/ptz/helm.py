@@ -14,10 +14,11 @@ from services.camera.ptz.stand import stop as until_confirmed
 from services.camera.requests import Direction, Reading, Reply, Request, Start, Status
 
 NEAR_LEVELS = 0.5
-END_LEVELS, BEYOND_LEVELS = 0.3, 0.0
+END_LEVELS = 0.3  # zoom ends so far from the ends of its range
 ODD_DEG = 0.4  # a reading farther from what was reckoned may not be of a camera at rest
 LATE_DOUBT_S = 0.15  # the age of readings is not known well: two equal ones, then
 LONGEST_DOUBT_S = 0.35
+UNSURE_LEVELS = 0.1  # it is not said to stand at the very end, which it may just have missed
 FOREVER = 1e12
 WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
 SURPRISES = 0.2  # of what was known before is replaced by each rest
@@ -167,7 +168,8 @@ class Helm:
         if self.zoom_ends is None:
             half = max(0.1, self.skill.zoom_grid / 2)
             low, high = self.limits.zoom
-            off = min(high, max(low, self.course.stopped(ZOOM, FOREVER))) - reading.zoom
+            reckoned = self.course.stopped(ZOOM, FOREVER)
+            off = min(high - UNSURE_LEVELS, max(low + UNSURE_LEVELS, reckoned)) - reading.zoom
             self.skill.zoomed = (reading.zoom, reading.zoom + (off if abs(off) <= half else sign(off) * half / 2))
 
     def least(self, axis: int) -> float:
@@ -175,12 +177,9 @@ class Helm:
         return self.skill.paces[axis].rate(1) * self.skill.timing.usual
 
     def zoom_aim(self) -> float:
-        """Where zoom should end. A digital zoom has no stop: at an end of its range it is held a little longer."""
+        """Where zoom should end: a late end does no harm there, and its coarse reading is the goal's."""
         low, high = self.limits.zoom
-        goal = self.goal.pose[ZOOM]
-        if goal - low < END_LEVELS:
-            return low - BEYOND_LEVELS
-        return high + BEYOND_LEVELS if high - goal < END_LEVELS else goal
+        return min(high - END_LEVELS, max(low + END_LEVELS, self.goal.pose[ZOOM]))
 
     @property
     def zoom_near(self) -> float:
