@@ -29,11 +29,14 @@ from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.peers import mosquitto
 from services.runner import Runner
+from tests import footprint
 from tests.bridge import bench as bridge_bench
 from tests.camera import goal_figures, scan_figures
 from tests.dashboard import bench as dashboard_bench
 from tests.mission import bench as mission_bench
+from tests.persistence import bench as writer_bench
 from tests.persistence import figures as writer_figures
+from tests.persistence import year_bench
 from tests.vision import bench as vision_bench
 
 MESSAGES = 20_000
@@ -155,6 +158,15 @@ def rates(port: int, protocol: int, run: Callable[[int, int, Callable[[], None]]
 Part = tuple[Table, list[Any]]  # what people see of a part, and the same for programs
 
 
+@dataclass(frozen=True)
+class Size:
+    """How much is measured: runs of each, messages of a backlog and live for the writer, items of the year."""
+
+    runs: int = RUNS
+    messages: int = STORED
+    items: int = year_bench.ITEMS
+
+
 def bus_and_runner(folder: Path, runs: int) -> list[Figure]:
     """QoS 1 through the bus, the runner and a service that does nothing, over MQTT 3.1.1 and 5."""
     figures = []
@@ -168,9 +180,9 @@ def bus_and_runner(folder: Path, runs: int) -> list[Figure]:
     return figures
 
 
-def bus_part(folder: Path, runs: int) -> Part:
+def bus_part(folder: Path, size: Size) -> Part:
     """The bus and the runner."""
-    figures = bus_and_runner(folder, runs)
+    figures = bus_and_runner(folder, size.runs)
     table = Table("figure", "value", "floor", "ratio", "wanted", "the floor is")
     for figure in figures:
         table.add_row(figure.name, f"{figure.value:,.0f} {figure.unit}", f"{figure.floor:,.0f} {figure.unit}",
@@ -178,57 +190,71 @@ def bus_part(folder: Path, runs: int) -> Part:
     return table, [{**asdict(figure), "ratio": figure.ratio} for figure in figures]
 
 
-def stored_part(folder: Path, runs: int) -> Part:
+def stored_part(folder: Path, size: Size) -> Part:
     """Persistence."""
-    rows = writer_figures.rows(folder / "writer", runs, STORED)
-    return writer_table(rows), [asdict(row) for row in rows]
+    rows = writer_bench.rows(folder / "writer", size.runs, size.messages)
+    return writer_table("writer, QoS 1, a commit before each acknowledgement", rows), [asdict(row) for row in rows]
 
 
-def moves_part(_: Path, __: int) -> Part:
+def year_part(folder: Path, size: Size) -> Part:
+    """A year of history."""
+    rows = list(year_bench.rows(folder / "year", size.items))
+    return writer_table(f"a year of {size.items} items, a row a minute", rows), [asdict(row) for row in rows]
+
+
+def moves_part(_: Path, __: Size) -> Part:
     """The camera's goals."""
     rows = goal_figures.rows()
     return goals_table(rows), [asdict(row) for row in rows]
 
 
-def bridge_part(_: Path, __: int) -> Part:
+def bridge_part(_: Path, __: Size) -> Part:
     """The bridge to ROS."""
     rows = list(bridge_bench.rows())
     return bridge_bench.table(rows), [asdict(row) for row in rows]
 
 
-def scan_part(_: Path, __: int) -> Part:
+def scan_part(_: Path, __: Size) -> Part:
     """Scans of the flat."""
     rows = scan_figures.rows()
     return scan_figures.table(rows), list(scan_figures.plain(rows))
 
 
-def vision_part(_: Path, __: int) -> Part:
+def vision_part(_: Path, __: Size) -> Part:
     """Markers in pictures."""
     rows = list(vision_bench.rows())
     return vision_bench.table(rows), [asdict(row) for row in rows]
 
 
-def mission_part(_: Path, __: int) -> Part:
+def mission_part(_: Path, __: Size) -> Part:
     """Missions in random flats."""
     figures = mission_bench.figures()
     return mission_bench.table(figures), list(mission_bench.plain(figures))
 
 
-def dashboard_part(folder: Path, _: int) -> Part:
+def dashboard_part(folder: Path, _: Size) -> Part:
     """The dashboard."""
     rows = list(dashboard_bench.rows(folder))
     return dashboard_bench.table(rows), [asdict(row) for row in rows]
 
 
-PARTS: dict[str, Callable[[Path, int], Part]] = {
+def footprint_part(_: Path, __: Size) -> Part:
+    """Memory and processor of the whole apartment."""
+    rows = list(footprint.rows())
+    return footprint.table(rows), [asdict(row) for row in rows]
+
+
+PARTS: dict[str, Callable[[Path, Size], Part]] = {
     "bus": bus_part,
     "persistence": stored_part,
+    "year": year_part,
     "moves": moves_part,
     "bridge": bridge_part,
     "scan": scan_part,
     "vision": vision_part,
     "mission": mission_part,
     "dashboard": dashboard_part,
+    "footprint": footprint_part,
 }
 
 
@@ -237,23 +263,23 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--part", choices=["all", *PARTS], default="all")
     arguments.add_argument("--runs", type=int, default=RUNS, help="runs of each; the median counts")
+    arguments.add_argument("--messages", type=int, default=STORED, help="of a backlog, and live, for the writer")
+    arguments.add_argument("--items", type=int, default=year_bench.ITEMS, help="of the year: 525,600 rows each")
     arguments.add_argument("--json", type=Path, default=Path("bench.json"))
     given = arguments.parse_args()
     console = Console(width=None if sys.stdout.isatty() else 170)
     plain: list[Any] = []
     for name in PARTS if given.part == "all" else [given.part]:
         with tempfile.TemporaryDirectory() as folder:
-            table, rows = PARTS[name](Path(folder), given.runs)
+            table, rows = PARTS[name](Path(folder), Size(given.runs, given.messages, given.items))
         console.print(table)
         plain += rows
         given.json.write_text(json.dumps(plain, indent=1))
 
 
-def writer_table(rows: list[writer_figures.Row]) -> Table:
-    """The writer's figures."""
-    table = Table(
-        "writer, QoS 1, a commit before each acknowledgement", "value", "floor", "ratio", "wanted", "the floor is"
-    )
+def writer_table(name: str, rows: list[writer_figures.Row]) -> Table:
+    """Figures of the writer and of the history."""
+    table = Table(name, "value", "floor", "ratio", "wanted", "the floor is")
     for row in rows:
         floor, ratio = (f"{row.floor:,.0f}", f"{row.ratio:.2f}") if row.floor and row.ratio else ("", "")
         table.add_row(row.name, f"{row.value:,.1f} {row.unit}", floor, ratio, row.wanted, row.floor_is)

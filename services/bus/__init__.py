@@ -92,8 +92,13 @@ class Bus(Protocol):
 
 
 def topic_matches(topic_filter: str, topic: str) -> bool:
-    """Whether an MQTT filter (`+` one level, a last `#` any rest) matches a topic (MQTT 5, section 4.7)."""
+    """Whether an MQTT filter (`+` one level, a last `#` any rest) matches a topic (MQTT 5, section 4.7).
+
+    What stands before a shared one (`$share/<group>/`) says who gets the message, not which.
+    """
     wanted = topic_filter.split("/")
+    if wanted[0] == "$share":
+        wanted = wanted[2:]
     levels = topic.split("/")
     if topic.startswith("$") and wanted[0] in ("+", "#"):
         return False

@@ -14,6 +14,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from services.bus import Message
+from services.bus.network import Client
 
 Protocol = Literal[4, 5]
 WINDOW = 1000  # messages in a turn, and in flight from the broker (its max_inflight_messages is the same)
@@ -36,9 +37,9 @@ class Address:
     durable: bool = False  # the broker keeps our messages while we are away
 
 
-def client(address: Address, protocol: Protocol, will: Message | None = None, client_id: str = "") -> paho.Client:
+def client(address: Address, protocol: Protocol, will: Message | None = None, client_id: str = "") -> Client:
     """A client that acknowledges when told to, does not reconnect by itself and holds nothing back."""
-    made = paho.Client(
+    made = Client(
         CallbackAPIVersion.VERSION2,
         client_id=client_id or address.client_id,
         clean_session=None if protocol == 5 else not address.durable,

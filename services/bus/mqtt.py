@@ -1,8 +1,8 @@
 """The bus over paho, against any MQTT broker. How a client of it is made is in `connection.py`.
 
 Every connection is a fresh paho client: what was in flight on the old one is not resent by paho behind our back,
-so no command arrives late; the outbox decides what is said again. Three threads: the service's own, which calls
-every method here; paho's network thread, which only fills the inbox; a keeper that connects again.
+so no command arrives late; the outbox decides what is said again. Two threads: the service's own, which calls
+every method here; the keeper, which connects again and again, fills the inbox and writes (`network.py`).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from paho.mqtt.reasoncodes import ReasonCode
 
 from services.bus import LOST_TOPIC, SESSION_TOPIC, WAKE_TOPIC, Delivery, Message, connection, topic_matches
 from services.bus.connection import CONNECT_TIMEOUT_S, WINDOW, Address
+from services.bus.network import Client, Network
 from services.bus.outbox import Outbox
 
 log = logging.getLogger(__name__)
@@ -57,7 +58,8 @@ class MqttBus:
         self._acknowledged: deque[int] = deque()
         self._to_acknowledge: deque[Delivery] = deque()
         self._client: paho.Client | None = None
-        self._up = 0  # the number of the connection that stands; set by paho's thread
+        self._network = Network()
+        self._up = 0  # the number of the connection that stands; set by the keeper's thread
         self._greeted = 0  # the one on which the outbox has spoken; set by the service's thread
         self._closing = threading.Event()
         self._lost = threading.Event()
@@ -115,10 +117,7 @@ class MqttBus:
     def ack(self, messages: Iterable[Message]) -> None:
         """See `Bus`."""
         self._to_acknowledge.extend([one.token for one in messages if one.qos and one.token is not None])
-        if (
-            self._inbox.empty()
-        ):  # else the network's thread does it at the next message: two busy threads hinder each other
-            self._acknowledge()
+        self._network.wake()
 
     def close(self) -> None:
         """See `Bus`."""
@@ -128,21 +127,12 @@ class MqttBus:
         if client is not None and was_connected:
             self._wait_for_the_last_words()
             client.disconnect()
+            self._lost.wait(FAREWELL_S)
         self._lost.set()
+        self._network.wake()
         self._keeper.join(CONNECT_TIMEOUT_S + 1.0)
 
     # -- the service's thread, inside
-
-    def _acknowledge(self) -> None:
-        """From either thread; what came by an older connection is left out."""
-        client = self._client
-        while self._to_acknowledge and client is not None:
-            try:
-                token = self._to_acknowledge.popleft()
-            except IndexError:  # the other thread was faster
-                return
-            if token.connection == self._up:
-                client.ack(token.packet, 1)
 
     def _keep_up(self) -> None:
         self._forget_acknowledged()
@@ -204,6 +194,7 @@ class MqttBus:
             self._one_connection()
             pause = RETRY_S[0] if self.connections > before else min(pause * 2, RETRY_S[1])
             self._closing.wait(pause * random.uniform(0.8, 1.2))
+        self._network.close()
 
     def _one_connection(self) -> None:
         try:
@@ -214,19 +205,24 @@ class MqttBus:
         except (OSError, ValueError) as error:
             self._tell(f"no connection to {self.address.host}:{self.address.port}: {error}")
             return
-        client.loop_start()
-        self._lost.wait()
+        self._network.run(client, self._lost, lambda: self._acknowledge(client))
         self._up = 0
-        client.loop_stop()
         self._let_go(client)
 
-    def _let_go(self, client: paho.Client) -> None:
+    def _let_go(self, client: Client) -> None:
         """Its sockets are closed when nobody holds it any more; in a circle with us that would be left to chance."""
         client.on_connect = client.on_disconnect = client.on_message = client.on_publish = None
         if self._client is client:
             self._client = None
 
-    def _new_client(self) -> paho.Client:
+    def _acknowledge(self, client: Client) -> None:
+        """What the service has done with; what came by an older connection is left out."""
+        done = self._to_acknowledge
+        packets = [token.packet for _ in range(len(done)) if (token := done.popleft()).connection == self._up]
+        if packets:
+            client.ack_all(packets)
+
+    def _new_client(self) -> Client:
         client = connection.client(self.address, self._protocol, self._will)
         client.on_connect = self._on_connect
         client.on_disconnect = self._on_disconnect
@@ -240,7 +236,7 @@ class MqttBus:
             log.warning("%s", text)
             self._told = text
 
-    # -- paho's thread
+    # -- the same thread, called by paho
 
     def _on_connect(self, client: paho.Client, _data: Any, flags: Any, reason: ReasonCode, _properties: Any) -> None:
         if reason.is_failure:
@@ -275,6 +271,7 @@ class MqttBus:
         self._lost.set()
 
     def _on_message(self, _client: paho.Client, _data: Any, message: paho.MQTTMessage) -> None:
+        self._network.messages += 1
         try:
             topic = message.topic
         except UnicodeDecodeError:  # a broker must refuse it (MQTT 5, 1.5.4); it would end this thread
@@ -290,7 +287,6 @@ class MqttBus:
         if asked is not None and hasattr(asked, "ResponseTopic"):
             came = came._replace(reply_to=asked.ResponseTopic, correlation=getattr(asked, "CorrelationData", None))
         self._inbox.put(came)
-        self._acknowledge()
 
     def _on_publish(self, _client: paho.Client, _data: Any, mid: int, _reason: Any, _properties: Any) -> None:
         self._acknowledged.append(mid)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Set
-from dataclasses import replace
 
 from services.home import Home
 from services.persistence import rows, strategies
@@ -24,8 +23,9 @@ log = logging.getLogger(__name__)
 class Decisions:
     """What of a turn is to be written. `learn` comes first: without the last values every state is a change."""
 
-    def __init__(self, home: Home, rules: Mapping[str, Rule], counters: Counter[str]) -> None:
+    def __init__(self, home: Home, rules: Mapping[str, Rule], counters: Counter[str], unknown: Rule) -> None:
         self._home = home
+        self._unknown = unknown  # the rule of an item that the home's model does not have
         self._counters = counters
         self._rules = rules
         self._last: dict[str, strategies.Value] = {}  # as heard, else as stored: what a change is measured by
@@ -59,22 +59,20 @@ class Decisions:
         for one in gathered:
             if isinstance(one, State) and self._rule(one.item).stores:
                 before = new.get(one.item) or known.get(one.item)
-                if before is not None and before.kind == one.kind and (before.unit or one.kind != "Number"):
-                    continue  # as nearly always
-                item = self._item(one, before)
-                if before is None or (before.kind, before.unit) != (item.kind, item.unit):
-                    new[one.item] = item
+                if before is None:
+                    new[one.item] = Item(one.item, one.kind, self._unit(one))
+                elif before.kind != one.kind and one.item in self._home.items:  # else it has left the model
+                    new[one.item] = Item(one.item, one.kind, (one.kind == "Number" and before.unit) or self._unit(one))
+                elif not before.unit and before.kind == one.kind and (unit := self._unit(one)):
+                    new[one.item] = Item(one.item, one.kind, unit)
         return list(new.values())
 
-    def _item(self, state: State, known: Item | None) -> Item:
-        """The unit is the one that is stored, else the model's, else that of the first value."""
+    def _unit(self, state: State) -> str | None:
+        """Of an item that has none yet: the model's, else that of the first value."""
+        if state.kind != "Number":
+            return None
         model = self._home.items.get(state.item)
-        if model is None and known is not None and known.kind != state.kind:
-            return known  # it has left the model; what is stored keeps its meaning
-        unit = None
-        if state.kind == "Number":
-            unit = (known and known.unit) or (model and model.unit) or state.unit or None
-        return Item(state.item, state.kind, unit)
+        return (model and model.unit) or state.unit or None
 
     def batch(self, gathered: Iterable[State | Row], items: Mapping[str, Item]) -> Batch:
         """What of it is to be written; from now on it counts as the last value."""
@@ -97,7 +95,7 @@ class Decisions:
             rule = self._rule(name)
             lines = [n for n, line in enumerate(rule.lines) if any(cron in names for cron, _ in line.crons)]
             if lines and name in items and state.text not in SPECIAL:
-                again = replace(state, time=next_time())
+                again = state._replace(time=next_time())
                 if self._passes(again, rule, lines):
                     self._keep(batch, again, rows.sample(again, items[name].unit), items[name].unit)
         return batch
@@ -137,7 +135,7 @@ class Decisions:
         return Kept(state.kind, stored.num, stored.text or "", stored.time)
 
     def _keep(self, batch: Batch, state: State, sample: Sample, unit: str | None) -> None:
-        if not rows.fits(state, unit):
+        if sample.num is None and state.num is not None:
             self._count_mismatch(state, unit)
         self._stored[state.item] = sample
         batch.samples.append(sample)
@@ -154,4 +152,4 @@ class Decisions:
         return changed
 
     def _rule(self, name: str) -> strategies.Rule:
-        return self._rules.get(name, strategies.UNKNOWN_ITEM)
+        return self._rules.get(name, self._unknown)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from services import states
 from services.errors import BadMessage
@@ -34,8 +34,7 @@ EARLIEST, LATEST = 1_000_000, (2**31 - 1) * 1_000_000  # what MariaDB's TIMESTAM
 MARKERS = range(-(2**31), 2**31)
 
 
-@dataclass(frozen=True, slots=True)
-class State:
+class State(NamedTuple):
     """A legal state of an item, before the item's unit is known; `unit` is empty where the text had none."""
 
     item: str

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from zlib import crc32
 
 from services.bus import Message
@@ -29,7 +29,7 @@ class Seen:
     def __init__(self, client: str) -> None:
         self._client = client
         self._known: dict[int, int] = {}  # packet id to checksum, oldest first
-        self._fresh: deque[tuple[int, int]] = deque(maxlen=REMEMBERED)  # not committed yet
+        self._fresh: deque[bytes] = deque(maxlen=REMEMBERED)  # pairs that are not committed yet
         self._turn = 0
 
     @property
@@ -53,23 +53,19 @@ class Seen:
         if delivery.again and self._known.get(delivery.packet) == checksum:
             return True
         self._remember(delivery.packet, checksum)
-        self._fresh.append((delivery.packet, checksum))
+        self._fresh.append(PAIR.pack(delivery.packet, checksum))
         return False
 
     def turn(self) -> SeenTurn | None:
         """What goes with the rows of this turn, and of turns before that had none; None when nothing is new."""
         if not self._fresh:
             return None
-        packets = b"".join(self._packed())
-        return SeenTurn(self._client, (self._turn + 1) % SLOTS, self._turn + 1, packets)
+        return SeenTurn(self._client, (self._turn + 1) % SLOTS, self._turn + 1, b"".join(self._fresh))
 
     def committed(self) -> None:
         """What `turn` gave is stored."""
         self._turn += 1
         self._fresh.clear()
-
-    def _packed(self) -> Iterator[bytes]:
-        return (PAIR.pack(packet, checksum) for packet, checksum in self._fresh)
 
     def _remember(self, packet: int, checksum: int) -> None:
         known = self._known

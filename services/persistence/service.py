@@ -24,6 +24,7 @@ from services.persistence.connection import Connection
 from services.persistence.decisions import Decisions
 from services.persistence.seen import Seen
 from services.persistence.strategies import Restore, Rule, Timetable
+from services.persistence.writers import Writers
 from services.runner import Post
 from services.storage import Batch, Row, Storage, open_storage
 from services.storage.settings import DatabaseSection
@@ -44,19 +45,20 @@ class Config(DatabaseSection):
     broker_queue: int = Field(default=1_000_000, ge=1)  # the broker's max_queued_messages, as in mosquitto.conf
     name: str = "persistence"
     strategies: Path | None = None  # persistence.yaml; without it `persist` of each item in home.yaml says when
+    writers: Writers = Writers()  # one, unless it is said that there are more
     home: Home
 
     @property
     def rules(self) -> dict[str, Rule]:
-        """The rule of every item; ConfigError when the file of strategies has faults."""
-        return rulebook.rules(self.home, self.folder / self.strategies if self.strategies else None)
+        """The rule of every item of this writer; ConfigError when the file of strategies has faults."""
+        found = rulebook.rules(self.home, self.folder / self.strategies if self.strategies else None)
+        return self.writers.rules(found)
 
 
 def check(config: Config) -> None:
     """ConfigError with every fault of the strategies."""
-    if faults := list(strategies.faults(config.home)):
+    if faults := list(strategies.faults(config.home)) or list(config.writers.faults(config.rules)):
         raise ConfigError(faults)
-    assert config.rules is not None
 
 
 @contextmanager
@@ -78,19 +80,19 @@ class Persistence:
 
     def __init__(self, config: Config, opener: Callable[[], Storage]) -> None:
         own_status = topics.SERVICE_STATUS.filter_for(service=config.name)  # its echo shows that there is a broker
-        stored = (row.filter for row in topics.TABLE if row.stored)
-        self.subscribes = (*stored, own_status, *broker.FILTERS, SESSION_TOPIC)
+        self.subscribes = (*config.writers.filters(config.home), own_status, *broker.FILTERS, SESSION_TOPIC)
         self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self.connection = Connection(opener, self.counters)
         self._home = config.home
+        self._writers = config.writers
         rules = config.rules
         self._timetable = Timetable(rules)
-        self._decisions = Decisions(config.home, rules, self.counters)
+        self._decisions = Decisions(config.home, rules, self.counters, config.writers.unknown)
         self._restore = Restore(self._decisions.restored, config.restore_after_s)
         self._gathered: list[tuple[rows.State | Row, Message]] = []
         self._fresh: list[rows.State | Row] = []  # of it what is not there already
-        self._seen = Seen(config.name)
-        self._name = config.name
+        self._name = config.writers.name(config.name)
+        self._seen = Seen(self._name)
         self._broker = broker.Watch(config.broker_queue, self.counters)
         self._noted: int | None = None  # of the broker's count of dropped messages, in the database
         self._next_diagnostic = 0.0
@@ -124,9 +126,11 @@ class Persistence:
         known = topics.read(message, now)
         self._restore.begin(now)
         row = rows.read(known, self._next_time(message.received or now), self._home) if known.topic.stored else None
+        if row is None or not self._writers.takes(row):
+            return ()
         if isinstance(row, rows.State) and self._restore.saw(row.item, row.text):
             self._decisions.heard(row)
-        elif row is not None:
+        else:
             self._gathered.append((row, message))
         return ()
 
@@ -180,7 +184,7 @@ class Persistence:
             if not self.counters["clock_steps"]:
                 log.warning("the clock is %.1f s behind what is stored; times go on from there", behind / 1e6)
             self.counters["clock_steps"] += 1
-        self._time = max(microseconds, self._time + 1)
+        self._time = self._writers.next_time(microseconds, self._time)
         return self._time
 
     def _learn(self, storage: Storage) -> None:

@@ -26,7 +26,8 @@ log = logging.getLogger(__name__)
 CONNECT_TIMEOUT_S = 5
 ANSWER_TIMEOUT_S = 30  # without one a pulled cable would hang for ever
 SESSION = "SET time_zone='+00:00', innodb_lock_wait_timeout=5"
-DEADLOCK = {1205, 1213}  # a lock that waited too long; a transaction chosen to give way (at COMMIT with Galera)
+# A lock that waited too long; a transaction chosen to give way (at COMMIT with Galera); the same of TiDB.
+DEADLOCK = {1205, 1213, 8022, 9007}
 DEADLOCK_PAUSE_S = (0.01, 0.1)
 DEADLOCK_TRIES = 5
 NO_ACCESS = {1044, 1045, 1049, 1142, 1227, 1698}  # no rights, wrong password, no such database

@@ -74,10 +74,9 @@ def literal(value: float | str | None, escape: Escape) -> str:
 
 def inserts(batch: Batch, items: Mapping[str, Item], escape: Escape) -> Iterator[str]:
     """The statements that write a batch, samples first."""
-    ids = {name: item.item_id for name, item in items.items()}
     samples = (
-        f"({ids[s.item]},{moment(s.time)},{'NULL' if s.num is None else repr(s.num)},{literal(s.text, escape)})"
-        for s in batch.samples
+        f"({items[item].item_id},{moment(time)},{'NULL' if num is None else repr(num)},{literal(text, escape)})"
+        for item, time, num, text in batch.samples
     )
     yield from _insert("sample", ("item_id", "time", "num", "text"), samples)
     for row, table in TABLES.items():

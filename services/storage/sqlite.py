@@ -126,11 +126,11 @@ class SqliteStorage:
 
     def write(self, batch: Batch) -> None:
         """See `Storage`."""
-        ids = {name: item.item_id for name, item in self._items.items()}
+        items = self._items
         with _translated(), self._transaction():
             self._connection.executemany(
                 "INSERT INTO sample VALUES (?, ?, ?, ?) ON CONFLICT DO NOTHING",
-                ((ids[sample.item], sample.time, sample.num, sample.text) for sample in batch.samples),
+                ((items[sample.item].item_id, sample.time, sample.num, sample.text) for sample in batch.samples),
             )
             for row in batch.rows:
                 self._connection.execute(INSERT[TABLES[type(row)]], astuple(row))

@@ -7,8 +7,7 @@ stand in the modules beside, by whose they are. What a row is stands in `service
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
@@ -34,14 +33,13 @@ TABLE: tuple[Topic, ...] = tuple(
 )
 
 
-@dataclass(frozen=True)
-class Read:
-    """A message as the table understands it."""
+class Read(NamedTuple):
+    """A message as the table understands it. A tuple, as Message is."""
 
     topic: Topic
     levels: dict[str, str]
     payload: Any
-    message: Message = field(repr=False)
+    message: Message
 
 
 def find(topic: str) -> tuple[Topic, dict[str, str]]:

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 ENOUGH = 16.0  # belief (natural logarithm of odds) of any marker
 ENOUGH_OF_TARGETS = 14.0  # of one that was asked for: what looks like any marker is rarely that one
-FIRST_CORRELATION = 0.4  # of a rough square worth refining: its corners are half a pixel off
+FIRST_CORRELATION = 0.3  # of a rough square with a code in question: its corners are half a pixel off
 FIRST_CONTRAST = 5.0  # grey levels
 FIRST_DARK, FIRST_EDGED = 0.5, 0.4  # shares, as below
 LEAST_CONTRAST = 6.0  # grey levels between light and dark cells; below is noise

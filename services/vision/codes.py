@@ -6,6 +6,7 @@ matched to it, so that a marker is read where its cells cannot be told apart any
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -47,6 +48,12 @@ class Book:
     def ids(self) -> int:
         """How many codes there are."""
         return len(self.codes) // 4
+
+    def rows(self, rows: Rows, ids: Collection[int] | None) -> Rows:
+        """Those of these ids, turned four ways; None: all."""
+        if ids is None:
+            return rows
+        return rows[[turns * self.ids + marker for turns in range(4) for marker in sorted(ids)]]
 
 
 @lru_cache(maxsize=8)

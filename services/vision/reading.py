@@ -7,6 +7,7 @@ chessboard or a page of text from being one. Where squares come from is `squares
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,13 +73,17 @@ class Evidence:
 
 def cells(grey: Picture, squares: Array, modules: int) -> Cells:
     """Looks into squares (n, 4, 2)."""
+    x, y = place(squares, *_spots(modules))
+    means = sample(grey, x, y).reshape(len(squares), len(SPOTS) ** 2, modules, modules).mean(axis=1)
+    return Cells(means, _outside(grey, squares, (np.arange(modules) + 0.5) / modules))
+
+
+@lru_cache(maxsize=8)
+def _spots(modules: int) -> tuple[Array, Array]:
+    """Where cells are sampled, as shares of the square: the first spot of every cell, then the second, ..."""
     middles = np.arange(modules) + 0.5
-    spots = (middles[:, None] + SPOTS).ravel() / modules
-    across, down = np.meshgrid(spots, spots)
-    x, y = place(squares, across.ravel(), down.ravel())
-    count = len(SPOTS)
-    means = sample(grey, x, y).reshape(len(squares), modules, count, modules, count).mean(axis=(2, 4))
-    return Cells(means, _outside(grey, squares, middles / modules))
+    down, across, row, column = np.meshgrid(SPOTS, SPOTS, middles, middles, indexing="ij")
+    return ((column + across) / modules).ravel(), ((row + down) / modules).ravel()
 
 
 def _outside(grey: Picture, squares: Array, share: Array) -> Array:

@@ -1,6 +1,6 @@
-"""Figures of the writer for `make bench`: how fast it stores, beside subscribers that only acknowledge; and latencies.
+"""What the writer's figures are measured with: publishers, subscribers that only acknowledge, and the writer itself.
 
-All of it is QoS 1 over MQTT 3.1.1, a commit before each acknowledgement, 1,000 items, on a real broker and database.
+All of it is QoS 1 over MQTT 3.1.1, 1,000 items, on a real broker. Not here: which figures there are (`bench.py`).
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import statistics
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import paho.mqtt.client as paho
@@ -23,16 +22,18 @@ from services.aside import Aside
 from services.bus.connection import Address as BusAddress
 from services.bus.mqtt import MqttBus
 from services.home import Home, Item
-from services.peers import mariadb, mosquitto
 from services.persistence import Config
 from services.persistence.service import Persistence
+from services.persistence.writers import Writers
 from services.runner import Runner
-from services.storage import Address, Batch, Storage, open_storage, read_address
+from services.storage import Batch, Storage
+from services.storage import Item as Stored
 
 ITEMS = 1000
 WINDOW = 500  # of the publisher, and of the acknowledgements of the second floor
 HOME = Home(items={f"I{n}": Item(type="Number", label="I", persist=("everyUpdate",)) for n in range(ITEMS)})
 FILTER = "home/+/state"
+ONE = Writers()
 Go = Callable[[], None]
 
 
@@ -93,15 +94,18 @@ def publishing(port: int, count: int, rate: float = 0.0) -> Iterator[Go]:
     process.join(300)
 
 
-def bare(port: int, count: int, *, together: int, backlog: bool) -> float:
-    """A floor: paho, which acknowledges each message, or so many at once. Messages per second."""
-    name, done, times, seen = f"bare{together}", threading.Event(), [0.0], [0]
+def bare(port: int, count: int, *, together: int, backlog: bool) -> tuple[float, float]:
+    """A floor: paho, which acknowledges each message, or so many at once.
+
+    Messages per second, and CPU microseconds per message.
+    """
+    name, done, times, seen = f"bare{together}", threading.Event(), [0.0, 0.0], [0]
     held: list[int] = []
     client = _bare_client(name, together)
 
     def on_message(_client: Any, _data: Any, message: Any) -> None:
         if not seen[0]:
-            times[0] = time.perf_counter()
+            times[:] = time.perf_counter(), time.process_time()
         seen[0] += 1
         if together > 1:
             held.append(message.mid)
@@ -110,7 +114,7 @@ def bare(port: int, count: int, *, together: int, backlog: bool) -> float:
                     client.ack(mid, 1)
                 held.clear()
         if seen[0] == count:
-            times.append(time.perf_counter())
+            times.extend((time.perf_counter(), time.process_time()))
             done.set()
 
     if backlog:
@@ -131,7 +135,8 @@ def bare(port: int, count: int, *, together: int, backlog: bool) -> float:
             assert done.wait(300), f"only {seen[0]} of {count} came"
     client.disconnect()
     client.loop_stop()
-    return (count - 1) / (times[1] - times[0])
+    began, began_cpu, ended, ended_cpu = times
+    return (count - 1) / (ended - began), (ended_cpu - began_cpu) / count * 1e6
 
 
 def _bare_client(name: str, together: int) -> paho.Client:
@@ -170,28 +175,35 @@ class Timed:
 
 
 class Writer:
-    """The service under its runner; `run` turns until so many rows are written."""
+    """The service under its runner."""
 
-    def __init__(self, port: int, address: Address) -> None:
-        self.storage = Timed(open_storage(address))
-        self.storage.add_items(_stored())
-        self.service = Persistence(Config(url="sqlite:///unused", home=HOME), lambda: self.storage)  # type: ignore[arg-type,return-value]
-        self.bus = MqttBus(BusAddress("writer", port=port, protocol=4, durable=True))
-        self.runner = Runner("writer", self.service, self.bus, time.time, Aside(None))
+    def __init__(self, port: int, storage: Storage, writers: Writers = ONE) -> None:
+        self.storage = Timed(storage)
+        self.storage.add_items([Stored(name, "Number") for name in HOME.items])
+        config = Config(url="sqlite:///unused", home=HOME, writers=writers)
+        self.service = Persistence(config, lambda: self.storage)  # type: ignore[arg-type,return-value]
+        name = writers.name("writer")
+        self.bus = MqttBus(BusAddress(name, port=port, protocol=4, durable=True))
+        self.runner = Runner(name, self.service, self.bus, time.time, Aside(None))
+
+    @property
+    def rows(self) -> int:
+        return self.service.counters["rows"]
 
     def connect(self) -> None:
         while not self.bus.connected:
             self.runner.turn(0.05)
         self.runner.turn(0.2)
 
+    def until(self, stored: Callable[[], bool]) -> None:
+        while not stored():
+            self.runner.turn(0.05)
+
     def run(self, count: int) -> tuple[float, float]:
         """Rows per second from the first to the last, and CPU seconds of this process."""
-        counters = self.service.counters
-        while not counters["rows"]:
-            self.runner.turn(0.05)
-        first, already, cpu = time.perf_counter(), counters["rows"], time.process_time()
-        while counters["rows"] < count:
-            self.runner.turn(0.05)
+        self.until(lambda: self.rows > 0)
+        first, already, cpu = time.perf_counter(), self.rows, time.process_time()
+        self.until(lambda: self.rows >= count)
         return (count - already) / (time.perf_counter() - first), time.process_time() - cpu
 
     def close(self) -> None:
@@ -199,22 +211,16 @@ class Writer:
         self.service.connection.close()
 
 
-def _stored() -> list[Any]:
-    from services.storage import Item as Stored
-
-    return [Stored(name, "Number") for name in HOME.items]
-
-
-def stores(port: int, address: Address, count: int, *, backlog: bool) -> tuple[float, float]:
+def stores(port: int, storage: Storage, count: int, *, backlog: bool) -> tuple[float, float]:
     """Our writer: messages per second until they are committed, and CPU microseconds per message."""
     if backlog:
         _subscribe_and_leave(port, "writer")
         with publishing(port, count) as go:
             go()
-        writer = Writer(port, address)
+        writer = Writer(port, storage)
         rate, cpu = writer.run(count)
     else:
-        writer = Writer(port, address)
+        writer = Writer(port, storage)
         writer.connect()
         with publishing(port, count) as go:
             go()
@@ -223,9 +229,9 @@ def stores(port: int, address: Address, count: int, *, backlog: bool) -> tuple[f
     return rate, cpu / count * 1e6
 
 
-def latency(port: int, address: Address, rate: float, seconds: float) -> tuple[float, float]:
+def latency(port: int, storage: Storage, rate: float, seconds: float) -> tuple[float, float]:
     """From being sent to being committed, milliseconds: median and 99th percentile."""
-    writer, count = Writer(port, address), int(rate * seconds)
+    writer, count = Writer(port, storage), int(rate * seconds)
     writer.connect()
     with publishing(port, count, rate) as go:
         go()
@@ -233,57 +239,3 @@ def latency(port: int, address: Address, rate: float, seconds: float) -> tuple[f
     ages = sorted(writer.storage.ages)
     writer.close()
     return 1000 * statistics.median(ages), 1000 * ages[int(len(ages) * 0.99)]
-
-
-def rows(folder: Path, runs: int, messages: int) -> list[Row]:
-    """All figures, medians of interleaved runs."""
-    found: dict[str, list[float]] = {}
-    folder.mkdir(parents=True, exist_ok=True)
-
-    def note(name: str, *values: float) -> None:
-        for number, value in enumerate(values):
-            found.setdefault(f"{name}/{number}", []).append(value)
-
-    with ExitStack() as stack:
-        server = stack.enter_context(mariadb.private(folder / "mariadb"))
-        for run in range(runs):
-            addresses = {"MariaDB": read_address(server.url, password=server.password),
-                         "SQLite": read_address(f"sqlite:///{folder}/bus{run}.db")}  # fmt: skip
-            for backlog in (True, False):
-                for together in (1, 500):
-                    with mosquitto.private(folder / f"m{run}{backlog}{together}", anonymous=True) as broker:
-                        note(
-                            f"bare{together}{backlog}", bare(broker.port, messages, together=together, backlog=backlog)
-                        )
-                for name, address in addresses.items():
-                    with mosquitto.private(folder / f"m{run}{backlog}{name}", anonymous=True) as broker:
-                        note(f"{name}{backlog}", *stores(broker.port, address, messages, backlog=backlog))
-            for rate in (100, 1000):
-                with mosquitto.private(folder / f"m{run}{rate}", anonymous=True) as broker:
-                    note(f"latency{rate}", *latency(broker.port, addresses["MariaDB"], rate, 5.0))
-    return _table({name: statistics.median(values) for name, values in found.items()})
-
-
-def _table(f: dict[str, float]) -> list[Row]:
-    each, batched = "bare paho, an ack each, the same way", "bare paho, acks by 500, the same way"
-    made = [Row("floor: bare paho draining, acks by 500", "msg/s", f["bare500True/0"]),
-            Row("floor: bare paho live, an ack each", "msg/s", f["bare1False/0"])]  # fmt: skip
-    for name in ("MariaDB", "SQLite"):
-        made += [
-            Row(
-                f"{name}: drains a backlog",
-                "msg/s",
-                f[f"{name}True/0"],
-                f["bare500True/0"],
-                batched,
-                ">= 0.5, goal 0.6",
-            ),
-            Row(f"{name}: drains a backlog", "msg/s", f[f"{name}True/0"], f["bare1True/0"], each),
-            Row(f"{name}: live flat out", "msg/s", f[f"{name}False/0"], f["bare1False/0"], each, ">= 0.9, goal 1.0"),
-            Row(f"{name}: CPU, draining", "us/msg", f[f"{name}True/1"]),
-        ]
-    for rate in (100, 1000):
-        made += [Row(f"publish to commit at {rate}/s, median", "ms", f[f"latency{rate}/0"]),
-                 Row(f"publish to commit at {rate}/s, 99 %", "ms", f[f"latency{rate}/1"],
-                     wanted="<= 10" if rate == 1000 else "")]  # fmt: skip
-    return made
