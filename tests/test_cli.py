@@ -62,8 +62,7 @@ def test_run_is_ready_when_everything_answers_and_ends_cleanly(apart: tuple[Path
     with command(["run", "--config", str(config)], environment) as (process, ready):
         assert set(ready["services"]) == {
             "simulated-camera",
-            "simulated-home+simulated-robot+persistence+bridge+mission",
-            "history",
+            "simulated-home+simulated-robot+persistence+history+bridge+mission",
             "camera-ip1",
             "dashboard",
         }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from functools import partial
 from types import SimpleNamespace
 from typing import Any, cast
@@ -19,6 +18,7 @@ from services.camera.video.likeness import likeness, thumb
 from services.camera.video.newest import Newest, Upright
 from services.camera.video.settings import StreamSettings
 from services.camera.video.timing import Exposure
+from services.peers import wait_until
 
 Picture = NDArray[np.uint8]
 PERIOD_S = 0.05
@@ -75,10 +75,7 @@ def test_a_turn_that_nobody_looked_at_ends_what_was_seen_before() -> None:
         given.extend(stream.live.collect())
         return sum(visit is second for visit, _, _ in given) == second.wanted
 
-    end = time.monotonic() + 10
-    while not developed():
-        assert time.monotonic() < end, "the second visit's pictures"
-        time.sleep(0.01)
+    wait_until(developed, "the second visit's pictures", 10)
     stream.live.close()
     assert any(visit is first for visit, _, _ in given)
     for visit, _, jpeg in given:
