@@ -6,6 +6,7 @@ Not here: starting processes again, that is `supervisor.py`; what a turn is, tha
 from __future__ import annotations
 
 import ctypes
+import faulthandler
 import importlib
 import json
 import logging
@@ -97,6 +98,7 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
     if os.environ.get(SUPERVISED):
         _end_with_parent()
     _few_arenas()
+    faulthandler.register(signal.SIGUSR1)  # what every thread is doing, for whoever finds a service that hangs
     addresses: dict[str, Any] = {}
 
     def one_is_ready(name: str, own: dict[str, Any]) -> None:
