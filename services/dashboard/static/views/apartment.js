@@ -239,11 +239,11 @@ function markers({ map, layers, side, stops }) {
       const [x, y] = map(one.position.x, one.position.y);
       const [a, b, turn] = ellipse(one.covariance);
       return s("g", { transform: `translate(${x} ${y})`, class: "marker", role: "img", "aria-label": `Marker ${one.marker}, ${one.place}`, "data-marker": one.marker },
-        s("title", {}, `Marker ${one.marker}: ${one.place}${one.covariance ? `, ± ${sure(one.covariance)} mm` : ""}`),
+        s("title", {}, `Marker ${one.marker}: seen from ${one.place}${one.covariance ? `, ± ${sure(one.covariance)} mm` : ""}`),
         s("ellipse", { rx: Math.max(0.04, a), ry: Math.max(0.04, b), transform: `rotate(${-turn})` }),
         s("rect", { x: -0.075, y: -0.075, width: 0.15, height: 0.15, rx: 0.02 }), s("text", { y: -0.14 }, `${one.marker}`));
     }));
-    side.markers.replaceChildren(...found.map((one) => h("li", {}, h("strong", {}, `${one.marker}`), h("span", {}, one.place, h("span", { class: "hint" }, ` ${ago(Date.parse(one.stamp))}${one.covariance ? `, ± ${sure(one.covariance)} mm` : ""}`)))));
+    side.markers.replaceChildren(...found.map((one) => h("li", {}, h("strong", {}, `${one.marker}`), h("span", {}, `from ${one.place}`, h("span", { class: "hint" }, ` ${ago(Date.parse(one.stamp))}${one.covariance ? `, ± ${sure(one.covariance)} mm` : ""}`)))));
     if (!found.length) side.markers.append(h("li", { class: "hint" }, "None found yet"));
   };
   draw();

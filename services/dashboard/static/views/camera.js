@@ -122,7 +122,7 @@ function scan(camera, may, order, stops) {
   const draw = () => found.replaceChildren(...live.all(`camera/${name}/marker/+`).map(({ json }) => {
     const p = json.position;
     const sigma = json.covariance ? Math.sqrt(Math.max(json.covariance[0][0], json.covariance[1][1], json.covariance[2][2])) : null;
-    return h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, json.place, h("span", { class: "hint" }, ` ${ago(Date.parse(json.stamp))}`)),
+    return h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, `from ${json.place}`, h("span", { class: "hint" }, ` ${ago(Date.parse(json.stamp))}`)),
       h("span", { class: "number" }, p ? `${p.x.toFixed(2)}, ${p.y.toFixed(2)}, ${p.z.toFixed(2)} m${sigma ? ` ± ${(sigma * 1000).toFixed(0)} mm` : ""}` : json.why));
   }));
   stops.push(live.watch(`camera/${name}/marker/+`, draw));
