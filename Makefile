@@ -9,7 +9,7 @@ PART ?= all
 N ?= 0
 SEED ?= 1
 
-.PHONY: demo test soak bench lint check clean system-packages
+.PHONY: demo test soak bench lint check clean sbom audit system-packages
 
 demo: $(VENV)/demo.stamp
 	@$(APARTMENT) demo $(ARGS)
@@ -27,6 +27,26 @@ lint: $(VENV)/dev.stamp
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/mypy
+
+# What runs, with versions, as CycloneDX; and what the package index knows against exactly these versions. From an
+# installation of its own, so that no tool of ours is in the list.
+sbom: build/product/stamp build/tools/stamp
+	build/tools/bin/cyclonedx-py environment build/product --of JSON --output-reproducible -o build/sbom.cdx.json
+	@echo build/sbom.cdx.json
+
+audit: build/product/stamp build/tools/stamp
+	build/product/bin/python -m pip freeze --exclude smart-apartment > build/product/versions.txt
+	build/tools/bin/pip-audit --requirement build/product/versions.txt --no-deps --disable-pip --strict --progress-spinner off
+
+build/product/stamp: pyproject.toml
+	$(PYTHON) -m venv build/product
+	build/product/bin/python -m pip install --quiet --disable-pip-version-check -e '.[embedded]'
+	@touch $@
+
+build/tools/stamp:
+	$(PYTHON) -m venv build/tools
+	build/tools/bin/python -m pip install --quiet --disable-pip-version-check 'cyclonedx-bom>=5' 'pip-audit>=2.7'
+	@touch $@
 
 # With root or sudo the Debian packages that the tests meet are installed; without, those tests say what they miss.
 system-packages:

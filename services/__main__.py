@@ -16,9 +16,9 @@ import typer
 from rich.console import Console
 
 from services import access, client, process, secret_store, topics
-from services.bus import Message
 from services.command_line import (
     backup,
+    bench,
     calibrate,
     completion,
     dashboard,
@@ -28,6 +28,7 @@ from services.command_line import (
     openhab,
     record,
     replay,
+    scan,
     secrets,
     status,
     steer,
@@ -136,41 +137,6 @@ def order(
         _ended(bus.order(camera, key, value, tell=None if json else _tell_order), json)
 
 
-@app.command(epilog="Example: apartment scan ip1 --target 582")
-def scan(
-    camera: Camera,
-    target: Annotated[list[int], typer.Option(help="A marker; repeat for more.", autocompletion=completion.markers)],
-    full: Annotated[bool, typer.Option("--full", help="Every place, in both picture modes.")] = False,
-    plot: Annotated[Path | None, typer.Option(help="Draw a plan with what was found into this PNG file.")] = None,
-    world: Annotated[Path | None, typer.Option(help="The file with the rooms; default: the simulated one.")] = None,
-    config: Config = CONFIG,
-    json: Json = False,
-) -> None:
-    """Look for markers with a camera; exit 1 when one was not found."""
-    from services.command_line import scanned  # it brings OpenCV
-
-    apartment = load(config)
-    if camera not in apartment.cameras:
-        raise typer.BadParameter(f"expected one of {', '.join(apartment.cameras) or 'none'}, got {camera!r}")
-    filters = [row.filter_for(cam=camera) for row in (topics.CAMERA_ORDER_RESULT, *scanned.HEARD)]
-    with client.connected(apartment.bus, filters) as bus:
-        wish = {"targets": target, "full": full}
-        result = bus.order(camera, "Scan", wish, timeout_s=600.0, tell=None if json else _tell_order)
-        heard = [message for message in bus.seen if not message.topic.endswith("/order_result")]
-    found = {read.payload.marker: read.message for read in _scan_results(heard)}
-    for message in found.values():
-        out.print_json(message.payload.decode()) if json else out.print(topics.read(message, message.received).payload)
-    if plot is not None:
-        scanned.plot(apartment, camera, heard, plot, world)
-    if result.state != "done" or not found:
-        raise typer.Exit(1)
-
-
-def _scan_results(heard: list[Message]) -> list[topics.Read]:
-    reads = (topics.read(message, message.received) for message in heard)
-    return [one for one in reads if one.topic is topics.CAMERA_SCAN_RESULT]
-
-
 @app.command(epilog="Example: apartment probe ip1 --url http://192.0.2.9 --user ros")
 def probe(
     camera: Annotated[str, typer.Argument(help="A camera of the configuration, or with --url a name for a new one.")],
@@ -198,10 +164,12 @@ def probe(
     command.run(out, target, out_folder or Path(f"probe-{camera}"), yes_move=yes_move, json_only=json)
 
 
+app.command(epilog="Example: apartment scan ip1 --target 582")(scan.scan)
 stored.add_to(app)
 app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
 app.command(epilog="Example: apartment restore apartment.zip")(backup.restore)
 app.command(epilog="Example: apartment doctor")(doctor.doctor)
+app.command(epilog="Example: apartment bench --part bus --runs 3")(bench.bench)
 app.command(epilog="Example: apartment install --dry-run")(install.install)
 app.command(epilog="Example: apartment completion bash >> ~/.bashrc")(completion.completion)
 app.command(epilog="Example: apartment status --live")(status.status)

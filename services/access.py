@@ -14,6 +14,7 @@ from pathlib import Path
 
 from services.registry import REGISTRY
 from services.topics import TABLE, Topic
+from services.whole_file import write_private
 
 CONF = Path(__file__).parents[1] / "mosquitto" / "mosquitto.conf"
 TLS_CONF = CONF.with_name("tls.conf")
@@ -90,17 +91,6 @@ def password_line(account: str, password: str) -> str:
 def write_passwords(file: Path, passwords: Mapping[str, str]) -> None:
     """Writes mosquitto's password file, for nobody else to read."""
     write_private(file, "".join(f"{password_line(account, password)}\n" for account, password in passwords.items()))
-
-
-def write_private(file: Path, text: str | bytes) -> None:
-    """Writes a file with mode 0600 from its first byte on; whoever reads meanwhile sees the old one or the new one."""
-    beside = file.with_name(f".{file.name}.{os.getpid()}")
-    beside.unlink(missing_ok=True)
-    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as output:
-        output.write(text.encode() if isinstance(text, str) else text)
-        output.flush()
-        os.fsync(output.fileno())
-    beside.replace(file)
 
 
 def broker_conf(folder: Path, data: Path | None = None, *, encrypted: bool = True) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 
 from services.bus import Message
 from services.payloads import stamp
+from services.whole_file import write_whole
 
 CRASHES = 2  # the first may have had another cause
 MOST = 100  # files of a service; the oldest go
@@ -47,10 +48,8 @@ class Aside:
         key = _key(message)
         self._crashes[key] = self._crashes.get(key, 0) + 1
         if self.folder is not None:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            beside = self.folder / f".{key}"
-            beside.write_text(json.dumps(_record(message, now, self._crashes[key]), indent=1), encoding="utf-8")
-            beside.replace(self.folder / f"{key}.json")
+            record = json.dumps(_record(message, now, self._crashes[key]), indent=1)
+            write_whole(self.folder / f"{key}.json", record)
             self._keep_the_newest()
 
     def _keep_the_newest(self) -> None:

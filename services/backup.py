@@ -7,7 +7,6 @@ are in a folder of their own (`services/credentials/`). Not here: how rows becom
 from __future__ import annotations
 
 import json
-import os
 import zipfile
 from collections.abc import Iterator
 from contextlib import closing
@@ -18,6 +17,7 @@ from services import __version__
 from services.config import Apartment
 from services.errors import ConfigError
 from services.storage import Address, dump, open_storage, upkeep
+from services.whole_file import PRIVATE, whole_file, write_whole
 
 FORM = 1  # of the archive
 DATABASE = "database.jsonl"
@@ -27,16 +27,11 @@ LARGEST = 1 << 30  # bytes of one file that is put back; a small archive may cla
 
 def save(file: Path, apartment: Apartment, database: Address | None) -> Iterator[str]:
     """Writes the archive; whoever looks meanwhile sees no file, or the old one. Yields a line for each part."""
-    beside = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        with open(os.open(beside, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600), "w+b") as output:
-            with zipfile.ZipFile(output, "w", zipfile.ZIP_DEFLATED, strict_timestamps=False) as archive:
-                yield from _save_parts(archive, apartment, database)
-            output.flush()
-            os.fsync(output.fileno())
-        beside.replace(file)
-    finally:
-        beside.unlink(missing_ok=True)
+    with (
+        whole_file(file, mode=PRIVATE) as output,
+        zipfile.ZipFile(output, "w", zipfile.ZIP_DEFLATED, strict_timestamps=False) as archive,
+    ):
+        yield from _save_parts(archive, apartment, database)
     yield f"{file}: {file.stat().st_size} bytes, without passwords"
 
 
@@ -98,11 +93,7 @@ def put_files_back(file: Path, begin: str, folder: Path, *, force: bool = False)
             if other:
                 raise ConfigError([f"{path}: expected no other file there: --force replaces it" for path in other])
         for one in wanted:
-            path = targets[one.filename]
-            path.parent.mkdir(parents=True, exist_ok=True)
-            beside = path.with_name(f".{path.name}.{os.getpid()}")
-            beside.write_bytes(archive.read(one))
-            beside.replace(path)
+            write_whole(targets[one.filename], archive.read(one))
     yield f"{folder}: {len(wanted)} files"
 
 

@@ -9,17 +9,17 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 from rich.console import Console
 from rich.panel import Panel
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from services import client, persistence, topics
 from services.client import Client
+from services.command_line.scan import progress
 from services.config import Apartment
 from services.payloads import Order, OrderResult, ScanResult, ScanState
 from services.process import ready_line
@@ -96,7 +96,7 @@ def _home_lives(out: Console, bus: Client) -> None:
 
 def _scan(out: Console, bus: Client, camera: str) -> ScanResult | None:
     out.print(f"The camera {camera} looks for marker {TARGET} ...")
-    with _progress(out) as advance:
+    with progress(out) as advance:
         end = _order_scan(bus, camera, advance)
     found = [
         topics.read(message, message.received).payload for message in bus.seen if message.topic.endswith("/scan/result")
@@ -120,25 +120,6 @@ def _order_scan(bus: Client, camera: str, advance: Callable[[ScanState], None]) 
             if isinstance(payload, OrderResult) and payload.id == order.id and payload.final:
                 return payload.error or payload.state
     return f"no answer within {SCAN_S:.0f} s"
-
-
-@contextmanager
-def _progress(out: Console) -> Iterator[Callable[[ScanState], None]]:
-    """A bar on a terminal, plain lines elsewhere."""
-    columns = (TextColumn("  {task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=out, disable=not out.is_terminal, transient=True) as bar:
-        task = bar.add_task("scan", total=1.0)
-        told: list[str] = []
-
-        def advance(state: ScanState) -> None:
-            text = f"{state.place or state.state} ({state.frames_analysed} frames)"
-            bar.update(task, completed=state.progress, description=text)
-            place = state.place or ""
-            if not out.is_terminal and place and place not in told:
-                told.append(place)
-                out.print(f"  looking from {place}")
-
-        yield advance
 
 
 def _judge(out: Console, result: ScanResult, world: World) -> bool:

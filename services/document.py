@@ -6,7 +6,6 @@ as booleans) stay texts, since `ON` is a state of a light here.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from typing import Any
 import yaml
 
 from services.errors import ConfigError
+from services.whole_file import write_whole
 
 Path_ = tuple[str | int, ...]
 MOST = (
@@ -105,13 +105,8 @@ def read(file: Path, secret: Callable[[str], str | None] | None = None, *, names
 
 def write(file: Path, value: Any) -> None:
     """Writes plain values as YAML; whoever reads meanwhile sees the old file or the new one, never a part."""
-    beside = file.with_name(f".{file.name}.{os.getpid()}")
     text: str = yaml.dump(value, Dumper=_Dumper, allow_unicode=True, sort_keys=False, default_flow_style=False)
-    with beside.open("w", encoding="utf-8") as output:
-        output.write(text)
-        output.flush()
-        os.fsync(output.fileno())
-    beside.replace(file)
+    write_whole(file, text)
 
 
 def must(document: Document) -> Any:

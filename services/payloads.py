@@ -45,6 +45,9 @@ Free = Annotated[
 ]  # whatever JSON can say; pydantic's parser lets NaN and 1e999 into an Any
 
 
+Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]  # a quantity; what comes back in an answer is `Free`
+
+
 class Payload(BaseModel):
     """The base of all: frozen, and a key that nobody knows is an error."""
 
@@ -97,9 +100,9 @@ class Order(Payload):
 class Position(Payload):
     """`camera/<cam>/position`: readings in degrees, zoom as a level; `place` when one is under the lens."""
 
-    pan: float
-    tilt: float
-    zoom: float
+    pan: Real
+    tilt: Real
+    zoom: Real
     moving: bool = False
     place: str | None = None
 
@@ -107,9 +110,9 @@ class Position(Payload):
 class PositionSet(Payload):
     """`camera/<cam>/position/set`: what is left out stays."""
 
-    pan: float | None = None
-    tilt: float | None = None
-    zoom: float | None = None
+    pan: Real | None = None
+    tilt: Real | None = None
+    zoom: Real | None = None
     id: str | None = Field(default=None, max_length=64)
     by: Who = "human"
 
@@ -140,9 +143,9 @@ class OrderResult(Payload):
 class Place(Payload):
     """One named place: readings, and the camera's own preset where it has one."""
 
-    pan: float
-    tilt: float
-    zoom: float = 0.0
+    pan: Real
+    tilt: Real
+    zoom: Real = 0.0
     preset: int | None = None
 
 
@@ -163,7 +166,7 @@ class Audio(Payload):
     """`camera/<cam>/audio`: a recording is done; `file` is its name in the audio folder."""
 
     file: str
-    seconds: float
+    seconds: Real
     bytes: int
 
 
@@ -179,31 +182,31 @@ class ScanState(Payload):
     progress: float = Field(default=0.0, ge=0.0, le=1.0)
     frames_taken: int = 0
     frames_analysed: int = 0
-    elapsed_s: float = 0.0
+    elapsed_s: Real = 0.0
     reason: str = ""
 
 
 class Point(Payload):
     """Metres, in the frame that the message names."""
 
-    x: float
-    y: float
-    z: float
+    x: Real
+    y: Real
+    z: Real
 
 
 class Quaternion(Payload):
     """A unit quaternion."""
 
-    x: float
-    y: float
-    z: float
-    w: float
+    x: Real
+    y: Real
+    z: Real
+    w: Real
 
 
 class WeightedQuaternion(Quaternion):
     """One of several orientations that are possible; the weights of one list add up to 1."""
 
-    weight: float
+    weight: Real
 
 
 class ScanResult(Payload):
@@ -215,12 +218,12 @@ class ScanResult(Payload):
     place: str
     position: Point | None
     why: str | None = None
-    covariance: list[list[float]] | None = None
+    covariance: list[list[Real]] | None = None
     orientation: Quaternion | None = None
     orientations: list[WeightedQuaternion] = []
     frame: str = "apartment"
-    distance: float | None = None
-    zoom: float = 0.0
+    distance: Real | None = None
+    zoom: Real = 0.0
     frames: int = Field(default=1, ge=0)
     mode: str = "color"
     first_seen: str
@@ -248,7 +251,7 @@ class Calibration(Payload):
     views: int = 0
     said: str = ""
     regions: list[list[bool]] = []
-    values: dict[str, tuple[float, float]] = {}
+    values: dict[str, tuple[Real, Real]] = {}
     mount: dict[str, Free] | None = None
     file: str | None = None
     report: str | None = None
@@ -260,35 +263,3 @@ class Stream(Payload):
     rtsp: bool
     mjpeg: bool
     url: str
-
-
-class HistoryGet(Payload):
-    """`history/get`: a question. Times are ISO 8601 with an offset; no `until` is now, no `since` is from ever.
-
-    `what`: the newest `limit` `samples` of a span, or with `every` (seconds) one mean per bucket; the `last` sample
-    before `until`; the `changes` in a span, of all items when none is named; the `durations` of each state.
-    """
-
-    id: str = Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")
-    item: str | None = None
-    what: Literal["samples", "last", "changes", "durations"] = "samples"
-    since: str | None = None
-    until: str | None = None
-    limit: int | None = Field(default=None, ge=1)
-    every: float | None = Field(default=None, gt=0)
-
-
-class HistoryReply(Payload):
-    """`history/reply/<id>`: the answer; samples oldest first, `unit` that of their numbers.
-
-    `buckets` with `every`: begin, count, least, mean, greatest. `changes`: item, time, state. `durations`: seconds.
-    """
-
-    id: str
-    item: str | None
-    samples: list[tuple[str, float | str]]
-    unit: str | None = None
-    buckets: list[tuple[str, int, float, float, float]] | None = None
-    changes: list[tuple[str, str, float | str]] | None = None
-    durations: dict[str, float] | None = None
-    error: str | None = None

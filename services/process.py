@@ -6,6 +6,7 @@ Not here: starting processes again, that is `supervisor.py`; what a turn is, tha
 from __future__ import annotations
 
 import ctypes
+import faulthandler
 import importlib
 import json
 import logging
@@ -23,7 +24,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from services.access import write_private
 from services.aside import Aside
 from services.bus import WAKE_TOPIC, Message
 from services.bus.connection import Address
@@ -32,9 +32,14 @@ from services.config import Apartment, BusSettings, Instance, Tls
 from services.runner import Runner
 from services.steering import Steered
 from services.topics import SERVICE_STATUS
+from services.whole_file import write_private
+
+log = logging.getLogger(__name__)
 
 LONGEST_WAIT_S = 1.0
+CLOCK_BACK_S = 2.0  # a clock that is set back further ends a service, to be started again
 SIGNAL_S = 0.2  # a signal that comes while Python is about to wait is seen at the end of the wait only
+ARENAS = 2  # of glibc's memory: many threads that wait would take many times what one needs
 SUPERVISED = "APARTMENT_SUPERVISED"  # set by the supervisor: end when it ends
 Ready = Callable[[dict[str, Any]], None]
 OneReady = Callable[[str, dict[str, Any]], None]
@@ -92,6 +97,8 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
     """
     if os.environ.get(SUPERVISED):
         _end_with_parent()
+    _few_arenas()
+    faulthandler.register(signal.SIGUSR1)  # what every thread is doing, for whoever finds a service that hangs
     addresses: dict[str, Any] = {}
 
     def one_is_ready(name: str, own: dict[str, Any]) -> None:
@@ -143,7 +150,7 @@ def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event,
             runner = Runner(
                 name, Steered(name, service, stopping.set), bus, time.time, Aside(apartment.state / name / "aside")
             )
-            _turns(runner, stopping, lambda: ready(name, dict(getattr(service, "addresses", {}))))
+            _turns(runner, stopping, Clock(), lambda: ready(name, dict(getattr(service, "addresses", {}))))
     finally:
         bus.close()
 
@@ -154,9 +161,30 @@ def _wake(bus: MqttBus, stopping: threading.Event) -> None:
     bus.post(Message(WAKE_TOPIC))
 
 
-def _turns(runner: Runner, stopping: threading.Event, ready: Callable[[], None]) -> None:
+class Clock:
+    """Notices that the wall clock is set back, as on a small machine that learns the time late.
+
+    Whatever was due would be due only when that time comes again, a motor's stop too. So the service ends in good
+    order, which stops what turns, and is started again with everything due at its time.
+    """
+
+    def __init__(self, wall: Callable[[], float] = time.time, steady: Callable[[], float] = time.monotonic) -> None:
+        self._wall, self._steady = wall, steady
+        self._ahead = wall() - steady()
+
+    def set_back(self) -> float:
+        """By how many seconds; 0 where it is not worth ending for."""
+        ahead = self._wall() - self._steady()
+        back, self._ahead = self._ahead - ahead, max(self._ahead, ahead)
+        return back if back > CLOCK_BACK_S else 0.0
+
+
+def _turns(runner: Runner, stopping: threading.Event, clock: Clock, ready: Callable[[], None]) -> None:
     told = False
     while not stopping.is_set():
+        if back := clock.set_back():
+            log.warning("%s ends, to be started again: the clock was set back by %.0f s", runner.name, back)
+            stopping.set()
         runner.turn(min(LONGEST_WAIT_S, max(0.0, runner.due - time.time())))
         if not told and runner.bus.connected:
             ready()
@@ -190,6 +218,13 @@ def _end_with_parent() -> None:
     ctypes.CDLL(None, use_errno=True).prctl(pr_set_pdeathsig, signal.SIGTERM)
     if os.getppid() != int(os.environ[SUPERVISED]):
         os.kill(os.getpid(), signal.SIGTERM)  # it died before we asked
+
+
+def _few_arenas() -> None:
+    """For this process, and for those that it starts (mallopt(3), M_ARENA_MAX); a C library without it needs none."""
+    m_arena_max = -8
+    if hasattr(library := ctypes.CDLL(None), "mallopt"):
+        library.mallopt(m_arena_max, int(os.environ.setdefault("MALLOC_ARENA_MAX", str(ARENAS))))
 
 
 def ready_line(name: str, addresses: dict[str, Any]) -> str:

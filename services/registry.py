@@ -71,7 +71,7 @@ REGISTRY: tuple[Row, ...] = (
         durable=True,
         protocol=4,
     ),
-    Row("history", "services.history", ("history",), "answers what was, and clears what is old"),
+    Row("history", "services.history", ("history",), "answers what was, and clears what is old", group="light"),
     Row("camera-<cam>", "services.camera", ("cameras", "<cam>"), "drives one camera: places, orders, scans"),
     Row("bridge", "services.bridge", ("bridge",), "maps the bus to ROS 1 topics and back", group="light"),
     Row("openhab", "services.openhab", ("openhab",), "mirrors an OpenHAB that has no MQTT binding", group="light"),

@@ -10,7 +10,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from services.payloads import Payload, Point, Who
+from services.payloads import Payload, Point, Real, Who
 
 Id = Field(default=None, max_length=64)
 
@@ -18,9 +18,9 @@ Id = Field(default=None, max_length=64)
 class RobotGoto(Payload):
     """`robot/<robot>/goto`: to a pose, or to a point that the robot's map names."""
 
-    x: float | None = None
-    y: float | None = None
-    yaw_deg: float = 0.0
+    x: Real | None = None
+    y: Real | None = None
+    yaw_deg: Real = 0.0
     point: str | None = Field(default=None, max_length=200)
     id: str | None = Id
 
@@ -41,9 +41,9 @@ class RobotCancel(Payload):
 class RobotPose(Payload):
     """`robot/<robot>/pose`: where it stands, in the map frame."""
 
-    x: float
-    y: float
-    yaw_deg: float
+    x: Real
+    y: Real
+    yaw_deg: Real
     stamp: str
 
 
@@ -60,7 +60,7 @@ class SeenMarker(Payload):
 
     marker: int
     position: Point | None = None
-    distance: float | None = None
+    distance: Real | None = None
 
 
 class RobotSeen(Payload):
@@ -97,14 +97,14 @@ class MissionState(Payload):
     place: str | None = None  # where it goes or looks
     reason: str = ""
     since: str
-    elapsed_s: float = 0.0
+    elapsed_s: Real = 0.0
     waiting: list[str] = []  # ids of orders that come next
 
 
 class MissionEvent(Payload):
     """One step of a mission as it is told afterwards."""
 
-    at_s: float
+    at_s: Real
     state: MissionStep
     text: str
 
@@ -119,7 +119,7 @@ class MissionResult(Payload):
     place: str | None = None
     position: Point | None = None
     by: str | None = None
-    elapsed_s: float = 0.0
+    elapsed_s: Real = 0.0
     story: list[MissionEvent] = []
     stamp: str
 
@@ -138,8 +138,8 @@ class Whereabouts(Payload):
     by: str
     place: str | None
     position: Point | None
-    sigma_m: float | None
-    age_s: float
+    sigma_m: Real | None
+    age_s: Real
     stamp: str
 
 

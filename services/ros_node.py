@@ -31,6 +31,9 @@ def rospy() -> Any:
 
 def begin(name: str) -> None:
     """Makes this process a node, once. Its only talk with the master is short: ask first whether there is one."""
+    logging.raiseExceptions = (
+        False  # on a full disk each line of rospy's own log file would bring a traceback into ours
+    )
     with _logging_kept():
         rospy().init_node(name, disable_signals=True, disable_rosout=True, disable_rostime=True)
 

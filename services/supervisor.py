@@ -62,7 +62,7 @@ def commands(groups: Sequence[tuple[str, ...]], config: Path) -> dict[str, list[
 
 
 class Supervisor:
-    """Watches its children from one thread; one thread per child only reads what it prints."""
+    """Watches its children from one thread; two threads per child only read what it prints and wait for its end."""
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class Supervisor:
         self.log_file = log_file  # for what the children log; None: our own standard error
         self.children = {name: Child(name, line) for name, line in commands.items()}
         self._environment = {**os.environ, **(environment or {}), SUPERVISED: str(os.getpid())}
-        self._news: queue.SimpleQueue[tuple[str, Child | None, str]] = queue.SimpleQueue()
+        self._news: queue.SimpleQueue[tuple[str, subprocess.Popen[str] | None, str]] = queue.SimpleQueue()
         self._stopping = False
 
     def stop(self) -> None:
@@ -107,15 +107,19 @@ class Supervisor:
             )  # fmt: skip
         child.started, child.start_at, child.ready = now, None, None
         child.restarts += 1
-        threading.Thread(target=self._read, args=(child, child.process), daemon=True, name=child.name).start()
+        for body in (self._read, self._await):
+            threading.Thread(target=body, args=(child.process,), daemon=True, name=child.name).start()
 
-    def _read(self, child: Child, process: subprocess.Popen[str]) -> None:
-        """A thread's body: passes on what the child prints, and that it ended."""
+    def _read(self, process: subprocess.Popen[str]) -> None:
+        """A thread's body: passes on what the child prints."""
         assert process.stdout is not None
         with process.stdout as lines:
             for line in lines:
-                self._news.put(("line", child, line))
-        self._news.put(("ended", child, str(process.wait())))
+                self._news.put(("line", process, line))
+
+    def _await(self, process: subprocess.Popen[str]) -> None:
+        """A thread's body: tells that the child ended, though a process of its own may still hold its output open."""
+        self._news.put(("ended", process, str(process.wait())))
 
     def _until_next_start(self) -> float:
         waits = [child.start_at - time.monotonic() for child in self.children.values() if child.start_at is not None]
@@ -123,9 +127,10 @@ class Supervisor:
 
     def _listen(self, timeout: float) -> None:
         try:
-            kind, child, text = self._news.get(timeout=timeout)
+            kind, process, text = self._news.get(timeout=timeout)
         except queue.Empty:
             return
+        child = next((one for one in self.children.values() if process is not None and one.process is process), None)
         if child is not None and kind == "line" and text.startswith("READY "):
             child.ready = json.loads(text.removeprefix("READY "))
         elif child is not None and kind == "ended" and not self._stopping:

@@ -29,6 +29,7 @@ from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.peers import mosquitto
 from services.runner import Runner
+from tests import footprint
 from tests.bridge import bench as bridge_bench
 from tests.camera import goal_figures, scan_figures
 from tests.dashboard import bench as dashboard_bench
@@ -237,6 +238,12 @@ def dashboard_part(folder: Path, _: Size) -> Part:
     return dashboard_bench.table(rows), [asdict(row) for row in rows]
 
 
+def footprint_part(_: Path, __: Size) -> Part:
+    """Memory and processor of the whole apartment."""
+    rows = list(footprint.rows())
+    return footprint.table(rows), [asdict(row) for row in rows]
+
+
 PARTS: dict[str, Callable[[Path, Size], Part]] = {
     "bus": bus_part,
     "persistence": stored_part,
@@ -247,6 +254,7 @@ PARTS: dict[str, Callable[[Path, Size], Part]] = {
     "vision": vision_part,
     "mission": mission_part,
     "dashboard": dashboard_part,
+    "footprint": footprint_part,
 }
 
 

@@ -86,11 +86,7 @@ class SmallFlat:
     @property
     def processes(self) -> list[int]:
         """The supervisor, its services, and their watchdogs."""
-        parents = {int(entry.name): parent_of(entry) for entry in Path("/proc").glob("[0-9]*")}
-        family = [self.process.pid]
-        for pid in family:  # it grows while we walk through it
-            family += [child for child, parent in parents.items() if parent == pid]
-        return family
+        return family(self.process.pid)
 
     @contextmanager
     def without_broker(self, how: signal.Signals) -> Iterator[None]:
@@ -124,6 +120,15 @@ class SmallFlat:
         """A client that hears these topics."""
         with connected(self.bus, filters) as client:
             yield client
+
+
+def family(pid: int) -> list[int]:
+    """A process and all that it and its children started, itself first."""
+    parents = {int(entry.name): parent_of(entry) for entry in Path("/proc").glob("[0-9]*")}
+    found = [pid]
+    for one in found:  # it grows while we walk through it
+        found += [child for child, parent in parents.items() if parent == one]
+    return found
 
 
 def parent_of(entry: Path) -> int:

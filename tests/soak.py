@@ -6,6 +6,7 @@ Prints its figures, and the seed that repeats them.
 from __future__ import annotations
 
 import argparse
+import logging
 import random
 import signal
 import statistics
@@ -27,6 +28,9 @@ from tests.attacks import flooding
 from tests.bridge import trials as bridge_trials
 from tests.camera import trials as camera_trials
 from tests.camera.scan.scenes import scan_a_scene
+from tests.chaos import trials as chaos_trials
+from tests.fuzz import trials as fuzz_trials
+from tests.installation import fresh_debian
 from tests.mission import flat_trials
 from tests.mission import trials as mission_trials
 from tests.persistence import trials as writer_trials
@@ -109,6 +113,33 @@ def lost_by_the_broker(one: writer_trials.Site, rng: random.Random, *, backlog: 
 
 
 @contextmanager
+def chaos() -> Iterator[Turn]:
+    """Ten minutes of faults in a new apartment each turn; its log tells what happened when."""
+
+    def turn(rng: random.Random) -> float:
+        logging.basicConfig(format="%(asctime)s %(message)s")
+        with tempfile.TemporaryDirectory() as name, chaos_trials.apartment(Path(name) / "apartment") as running:
+            return chaos_trials.chaos(running, rng.randrange(10**6), LONGEST_S)
+
+    yield turn
+
+
+@contextmanager
+def rubbish_everywhere() -> Iterator[Turn]:
+    """A hundred thousand messages and ten thousand requests at a new apartment each turn; messages a second."""
+
+    def turn(rng: random.Random) -> float:
+        seed = rng.randrange(10**6)
+        with tempfile.TemporaryDirectory() as name, fuzz_trials.apartment(Path(name) / "apartment") as running:
+            found = fuzz_trials.fuzz(running, seed, 100_000)
+        Console().print(f"seed {seed}: bad {found.bad}, answers {dict(found.answers)}")
+        assert not found.faults, found.faults
+        return found.messages / found.seconds
+
+    yield turn
+
+
+@contextmanager
 def missions() -> Iterator[Turn]:
     """A mission from the bedroom in a new flat each turn, on real parts, with an accident in the middle."""
 
@@ -172,8 +203,11 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
     "flats": (lambda: nullcontext(flat_trials.a_flat), 20, "s, virtual"),
     "real-flats": (lambda: nullcontext(flat_trials.on_real_parts), 2, "x the virtual time"),
     "detector": (detector_trials.in_numbers, 100, "false markers in 50 frames"),
+    "chaos": (chaos, 1, "s until everybody is well"),
+    "fuzz": (rubbish_everywhere, 1, "messages a second"),
     "flood": (flooding.floods, 5, "ms, the others' slowest of a hundred"),
     "positions": (positions.in_flats, 10, "mm off, median of a flat"),
+    "install": (lambda: nullcontext(fresh_debian.follow), 1, "min, docs/raspberry-pi.md on a new Debian"),
 }
 
 

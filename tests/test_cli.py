@@ -25,12 +25,17 @@ ROOT = Path(__file__).parents[1]
 
 
 @contextmanager
-def command(words: list[str], environment: dict[str, str]) -> Iterator[tuple[subprocess.Popen[str], dict[str, Any]]]:
+def command(
+    words: list[str], environment: dict[str, str], log: Path | None = None
+) -> Iterator[tuple[subprocess.Popen[str], dict[str, Any]]]:
     """A running `apartment ...`, and what its READY line says."""
+    said = log.open("wb") if log else subprocess.DEVNULL
     process = subprocess.Popen(
         [sys.executable, "-m", "services", *words], env={**os.environ, **environment}, cwd=ROOT,
-        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        stdout=subprocess.PIPE, stderr=said, text=True,
     )  # fmt: skip
+    if not isinstance(said, int):
+        said.close()
     assert process.stdout is not None
     with process.stdout as lines:
         try:
@@ -62,8 +67,7 @@ def test_run_is_ready_when_everything_answers_and_ends_cleanly(apart: tuple[Path
     with command(["run", "--config", str(config)], environment) as (process, ready):
         assert set(ready["services"]) == {
             "simulated-camera",
-            "simulated-home+simulated-robot+persistence+bridge+mission",
-            "history",
+            "simulated-home+simulated-robot+persistence+history+bridge+mission",
             "camera-ip1",
             "dashboard",
         }
@@ -86,6 +90,19 @@ def test_nothing_goes_on_when_run_itself_is_killed(apart: tuple[Path, dict[str, 
         pids = [one["pid"] for one in ready["services"].values()]
         process.kill()
         peers.wait_until(lambda: not [pid for pid in pids if alive(pid)], "the services to end", 6.0)
+
+
+def test_a_service_that_hangs_can_be_asked_where_and_goes_on(
+    apart: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    config, environment = apart
+    log = tmp_path / "log"
+    with command(["serve", "simulated-home", "--config", str(config)], environment, log) as (process, _):
+        process.send_signal(signal.SIGUSR1)
+        peers.wait_until(lambda: "most recent call first" in log.read_text(), "the stacks")
+        assert "in serve" in log.read_text()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 0
 
 
 def test_a_simulator_runs_alone(apart: tuple[Path, dict[str, str]]) -> None:

@@ -45,7 +45,7 @@ def test_the_simulated_apartment_needs_nothing_from_outside() -> None:
 
 def test_the_example_is_good_once_its_secrets_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
     missing = faults(CONFIG / "apartment.yaml")
-    assert len(missing) == 10
+    assert len(missing) == 11
     assert all("expected ${" in fault and "got nothing" in fault for fault in missing)
     for fault in missing:
         monkeypatch.setenv(fault.split("${")[1].split("}")[0], "invented")

@@ -78,6 +78,7 @@ def test_the_example_test_of_the_readme_runs(pytester: pytest.Pytester, simulate
         "scan",
         "history",
         "doctor",
+        "bench",
         "install",
         "backup",
         "restore",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from services import topics
+from services.bridge.limits import Allowance
 from services.bridge.node import Call, Inlet, Node, Outlet, Ports, Server
 from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard
@@ -14,6 +15,7 @@ from services.robot_payloads import MissionOrder, MissionState
 
 ORDER, STATE, CANCEL = "/iot_mission", "/iot_mission/state", "/iot_mission/cancel"
 KEY_VALUE = "diagnostic_msgs/KeyValue"
+MOST = 2.0  # orders a second; to cancel is never one too many
 FIND = "find"  # the one key of an order; its value is the marker
 
 
@@ -29,6 +31,7 @@ class Missions(Part):
         self._robot = robot
         self._state: MissionState | None = None
         self._is_new = False
+        self._allowance = Allowance()
 
     def hear(self, heard: Heard, now: float) -> None:
         """See `Part`."""
@@ -40,6 +43,7 @@ class Missions(Part):
         key, value = str(fields["key"]), str(fields["value"])
         if key.lower() != FIND or not value.strip().isdigit() or int(value) > 9999:
             raise BadMessage(f"expected key {FIND} and a marker's number as value")
+        self._allowance.take(ORDER, MOST, now)
         return [self._order(MissionOrder(find=int(value)))]
 
     def called(self, name: str, call: Call, now: float) -> Iterable[Message]:

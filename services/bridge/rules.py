@@ -10,9 +10,9 @@ import json
 import re
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, Field, FiniteFloat, field_validator, model_validator
 
 from services import topics
 from services.bridge import template
@@ -27,6 +27,15 @@ TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*")
 LEVEL = re.compile(r"\{([A-Za-z_][A-Za-z0-9_]*)\}")
 TABLE_ROOTS = frozenset(row.pattern.partition("/")[0] for row in topics.TABLE)
 KNOWN = ("payload", "topic", "received")  # what a field may name besides the levels of its topic
+
+
+def _rising(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        raise ValueError(f"expected [low, high], got {list(pair)}")
+    return pair
+
+
+Range = Annotated[tuple[FiniteFloat, FiniteFloat], AfterValidator(_rising)]
 
 
 class Rule(Section):
@@ -44,6 +53,8 @@ class Rule(Section):
     replay: bool = False  # who comes later is sent the newest message of every MQTT topic, and only he
     queue: int = Field(default=100, ge=1, le=100_000)  # per subscriber; the oldest goes when it is full
     rate: float | None = Field(default=None, gt=0)  # per second and topic at most; of what comes faster the newest goes
+    most: float | None = Field(default=None, gt=0)  # to_mqtt: a second at most; what is more is refused
+    ranges: dict[str, Range] = {}  # to_mqtt: by field (`x`), or by the key of a KeyValue; a number outside is refused
     retain: bool = False  # to_mqtt, on a topic of your own; those of the table know it themselves
     qos: Literal[0, 1] = 1  # the same; what comes from MQTT has that of its publisher
 
@@ -85,8 +96,8 @@ class Rule(Section):
         return self
 
     def _check_to_ros(self) -> None:
-        if self.payload is not None or self.retain or self.qos != 1:
-            raise ValueError("expected fields, and neither payload, retain nor qos, in a rule to_ros")
+        if self.payload is not None or self.retain or self.qos != 1 or self.most or self.ranges:
+            raise ValueError("expected fields, and neither payload, retain, qos, most nor ranges, in a rule to_ros")
         names = LEVEL.findall(self.mqtt)
         if len(names) != len(set(names)):
             raise ValueError("expected every {name} once in mqtt")

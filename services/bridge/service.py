@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
 from services import states, topics
-from services.bridge import rulebook
+from services.bridge import limits, rulebook
 from services.bridge.health import Health
 from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Node
 from services.bridge.pace import Pace
@@ -48,6 +48,7 @@ class Bridge:
         for rule in rules:
             if rule.direction == "to_mqtt":
                 self._to_mqtt[rule.ros].append(rule)
+        self._allowance = limits.Allowance()
         self._slow_to_ros: Pace[tuple[str, Fields, str]] = Pace()
         self._slow_to_mqtt: Pace[Message] = Pace()
         rows = (topics.DIAGNOSTICS, *(row for part in parts for row in part.rows))
@@ -157,6 +158,8 @@ class Bridge:
     def _from_ros(self, topic: str, fields: Fields, now: float) -> list[Message]:
         try:
             wanted = [(rule, to_mqtt(rule, fields, now)) for rule in self._to_mqtt[topic]]
+            for rule, _ in wanted:
+                limits.check(rule, fields, self._allowance, now)
             asked = [(rule, message) for rule, message in wanted if not self._is_refresh(message)]
             for _, message in asked:
                 self._check_home(message)

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from services.camera.plan import Plan, attempt, wait
 from services.camera.requests import Away, Errand, Identity
+from services.whole_file import write_whole
 
 BUSY_S = 1.0  # between two looks whether the camera has nothing else to do
 Pair = tuple[float, float]
@@ -106,10 +107,7 @@ class Abilities:
         if self.file is None:
             return
         try:
-            self.file.parent.mkdir(parents=True, exist_ok=True)
-            new = self.file.with_suffix(".new")
-            new.write_bytes(READER.dump_json(self._kept, indent=1))
-            new.replace(self.file)
+            write_whole(self.file, READER.dump_json(self._kept, indent=1))
         except OSError as error:
             log.warning("what the camera can do is not kept: %s", error)
 

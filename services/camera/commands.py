@@ -53,6 +53,9 @@ class RecordSound:
         return cls(seconds)
 
 
+LONGEST_NAME = 255  # bytes of a file's name on Linux (limits.h)
+
+
 @dataclass(frozen=True)
 class PlaySound:
     """Play a file of the audio folder on the camera's loudspeaker."""
@@ -63,6 +66,6 @@ class PlaySound:
     def read(cls, text: str) -> Self:
         """The order's value: a plain name, nothing that leads out of the folder. ValueError when it is none."""
         plain = text and not set(text) & set("/\\\0") and not text.startswith(".")
-        if not plain:
+        if not plain or len(text.encode(errors="surrogatepass")) > LONGEST_NAME:
             raise ValueError(f"expected the name of a file in the audio folder, got {text[:80]!r}")
         return cls(text)

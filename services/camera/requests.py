@@ -99,10 +99,11 @@ class MoveTo:
 
 @dataclass(frozen=True)
 class MoveOver:
-    """Let the firmware drive on by parts of its whole scale, -1 to 1; what that is in degrees is learnt."""
+    """Let the firmware drive on by parts of its whole scale, -1 to 1 (that is learnt), and by levels of zoom."""
 
     right: float
     down: float
+    zoom: float = 0.0
     form: Literal["Position", "moveRelatively"] = "Position"
     rank = Rank.MOVE
 

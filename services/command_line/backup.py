@@ -29,10 +29,14 @@ def backup(file: Path, config: Config = CONFIG) -> None:
 def restore(
     file: Path,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+    init: Annotated[
+        bool, typer.Option("--init", help="Make databases and accounts before the rows, as `apartment db init` does.")
+    ] = False,
     config: Config = CONFIG,
 ) -> None:
     """Put all of it back, the rows into an empty database; stop the services before."""
     from services import backup as work
+    from services.command_line import stored
 
     told = work.manifest(file)
     for line in work.put_files_back(file, work.CONFIG, config.parent, force=force):
@@ -41,6 +45,8 @@ def restore(
     for line in work.put_files_back(file, work.STATE, apartment.state, force=force):
         out.print(line, markup=False)
     if (database := _database(apartment)) is not None:
+        if init:
+            stored.init(config=apartment.file)
         for line in work.put_rows_back(file, database):
             out.print(line, markup=False)
 

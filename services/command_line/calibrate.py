@@ -29,6 +29,7 @@ from services.config import Apartment, load
 from services.errors import ConfigError
 from services.payloads import Calibration, OrderResult
 from services.topics import CAMERA_CALIBRATION, CAMERA_ORDER_RESULT, read
+from services.whole_file import write_whole
 
 app = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
 Report = Annotated[Path | None, typer.Option("--out", help="Where the report goes; default <camera>-<what>.html.")]
@@ -225,9 +226,9 @@ def write_mount(config: Path, camera: str, found: dict[str, Any]) -> None:
     try:
         text = with_mount(config.read_text(encoding="utf-8"), camera, found)
         backup = files.kept(config, time())
-        files.replaced(config, text.encode())
+        write_whole(config, text)
         if _mount_in(config, camera) != found and backup is not None:
-            files.replaced(config, backup.read_bytes())
+            write_whole(config, backup.read_bytes())
             raise ValueError("the mount could not be put there, the file is as it was")
     except ValueError as error:
         lines = [f"  {key}: {value}" for key, value in found.items()]

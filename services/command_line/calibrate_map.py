@@ -24,6 +24,7 @@ from services.config import Apartment, load
 from services.errors import BadMessage, ConfigError
 from services.section import Section
 from services.topics import CAMERA_MARKER, CAMERA_SCAN_RESULT, ROBOT_POSE, ROBOT_SEEN, read
+from services.whole_file import write_whole
 
 if TYPE_CHECKING:  # numbers, for this command alone: every process of a service loads this module
     from services.mission.both import Both
@@ -218,13 +219,13 @@ def _replace(file: Path, text: str) -> None:
     backup = files.kept(file, time())
     assert backup is not None
     old = robot_places.places(file)
-    files.replaced(file, text.encode())
+    write_whole(file, text)
     try:
         same = robot_places.places(file).model_copy(update={"apartment_to_map": old.apartment_to_map}) == old
     except ConfigError:
         same = False
     if not same:
-        files.replaced(file, backup.read_bytes())
+        write_whole(file, backup.read_bytes())
         line = next(line for line in text.splitlines() if line.startswith(robot_places.KEY))
         raise ConfigError([f"{file}:1: it does not lend itself to that and is as it was; put there by hand: {line}"])
     out.print(f"{file}: written; the old file is {backup}. Restart mission and bridge: they read it when they begin")

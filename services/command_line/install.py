@@ -46,6 +46,7 @@ def install(
         return
     plan = [] if there.is_file() else list(steps.copied(config.parent))
     plan += steps.files(apartment, Path(sys.executable))
+    plan += list(steps.gone(plan, root))
     plan += [steps.ACCOUNTS]
     if systemd:
         for step in plan:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import asdict
 from datetime import tzinfo
@@ -21,7 +22,7 @@ from services.command_line import completion
 from services.command_line.options import CONFIG, Config, Json
 from services.config import Apartment, load
 from services.errors import ConfigError
-from services.payloads import HistoryGet
+from services.history_payloads import HistoryGet
 
 if TYPE_CHECKING:  # the databases' libraries, for these commands alone
     from services.persistence import Config as Persistence
@@ -35,7 +36,7 @@ db = typer.Typer(no_args_is_help=True, help="The database: make, check, upgrade,
 
 def add_to(app: typer.Typer) -> None:
     """Adds these commands to the program's."""
-    app.command(epilog="Example: apartment history Lab_Temp --since 7d --every 1h")(history)
+    app.command(epilog="Example: apartment history Lab_Temp --since 24h --plot lab.png")(history)
     app.add_typer(db, name="db")
 
 
@@ -50,7 +51,7 @@ def history(
     until: Annotated[str, typer.Option(help="The same; now when not given.")] = "",
     every: Annotated[str, typer.Option(help="Count, least, mean, greatest per 5m, 1h, 1d.")] = "",
     limit: int = 20,
-    plot: Annotated[Path | None, typer.Option(help="Draw the numbers into this SVG file.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the numbers into this PNG or SVG file.")] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="Comma-separated values.")] = False,
     config: Config = CONFIG,
     json: Json = False,
@@ -66,7 +67,9 @@ def history(
         return
     asked = _question(item, what, begin, end, command.every_s(every), limit)
     if plot is not None:
-        plot.write_text(command.as_plot(address, asked, zone), encoding="utf-8")
+        if plot.suffix not in command.SUFFIXES:
+            raise ConfigError([f"--plot: expected a file in {' or '.join(command.SUFFIXES)}, got {str(plot)!r}"])
+        plot.write_bytes(command.as_plot(address, asked, zone, plot.suffix))
         _say(f"{plot}")
         return
     reply = command.ask(address, asked)
@@ -96,14 +99,36 @@ def _missions(found: list[dict[str, object]], zone: tzinfo, *, json: bool, as_cs
 
 @db.command(epilog="Example: apartment db init --admin root")
 def init(admin: Admin = "root", config: Config = CONFIG) -> None:
-    """Make the databases, the writer's account and the tables; what is there stays. A SQLite file is just made."""
+    """Make the databases, the accounts of writer, reader and keeper, and the tables; what is there stays.
+
+    A SQLite file is just made.
+    """
     from services.storage import open_storage, upkeep
 
-    address = _settings(load(config, ("persistence",))).address
-    if address.dialect == "mysql":
-        upkeep.make_databases(address, upkeep.administrator(address, admin, _admin_password()))
-    open_storage(address).close()
+    apartment = load(config, ("persistence", "history"))
+    address = _settings(apartment).address
+    if address.dialect == "sqlite":
+        open_storage(address).close()
+    else:
+        server = upkeep.administrator(address, admin, _admin_password())
+        upkeep.make_databases(address, server)
+        open_storage(address).close()
+        for other, rights in _readers(apartment, address):
+            upkeep.make_account(other, server, rights)
     _say(f"{address}: ready")
+
+
+def _readers(apartment: Apartment, writer: Address) -> Iterator[tuple[Address, Mapping[str, str]]]:
+    """Who of the section history comes under another name than the writer, and what he may do."""
+    from services import history as history_service
+    from services.storage import upkeep
+
+    settings = apartment.instances["history"].config if "history" in apartment.instances else None
+    if not isinstance(settings, history_service.Config):
+        return
+    for one, rights in ((settings.address, upkeep.READING), (settings.keeping_address, upkeep.KEEPING)):
+        if one.user != writer.user:
+            yield one, rights
 
 
 @db.command(epilog="Example: apartment db upgrade")

@@ -21,6 +21,7 @@ from services import access, document
 from services.credentials import certificates, passwords
 from services.credentials.certificates import Pair
 from services.errors import ConfigError
+from services.whole_file import write_private
 
 SERVERS = ("broker", "dashboard", "database")
 AUTHORITY = "authority"
@@ -49,10 +50,8 @@ class Folder:
         """Writes all passwords, in both forms."""
         self.make("credentials")
         for name, value in secrets.items():
-            access.write_private(self.path / "credentials" / name, value)
-        access.write_private(
-            self.path / "secrets.yaml", "".join(f"{name}: {_text(secrets[name])}\n" for name in secrets)
-        )
+            write_private(self.path / "credentials" / name, value)
+        write_private(self.path / "secrets.yaml", "".join(f"{name}: {_text(secrets[name])}\n" for name in secrets))
 
     def make(self, name: str = "") -> Path:
         """A folder in it (or itself) that only its owner can open."""
@@ -72,8 +71,8 @@ class Folder:
         """Writes a certificate and its key, the key first: nobody may find a certificate that has none."""
         certificate, key = self._files(name)
         self.make(name)
-        access.write_private(key, pair.key)
-        access.write_private(certificate, pair.certificate)
+        write_private(key, pair.key)
+        write_private(certificate, pair.certificate)
 
     def _files(self, name: str) -> tuple[Path, Path]:
         stem = "ca" if name == AUTHORITY else "server"
@@ -142,9 +141,9 @@ def write_broker(folder: Folder, cameras: Sequence[str]) -> None:
     broker, secrets = folder.make("broker"), folder.secrets()
     ours = {account: secrets[passwords.name_of(account)] for account in access.accounts(cameras)}
     lines = [access.password_line(account, password) for account, password in ours.items()]
-    access.write_private(broker / "passwords", "".join(f"{line}\n" for line in [*lines, *_others(broker, ours)]))
-    access.write_private(broker / "acl", access.acl(cameras))
-    access.write_private(broker / "mosquitto.conf", access.broker_conf(broker))
+    write_private(broker / "passwords", "".join(f"{line}\n" for line in [*lines, *_others(broker, ours)]))
+    write_private(broker / "acl", access.acl(cameras))
+    write_private(broker / "mosquitto.conf", access.broker_conf(broker))
 
 
 def _others(broker: Path, ours: dict[str, str]) -> list[str]:

@@ -21,10 +21,12 @@ from services.dashboard.sessions import Sessions, Tries
 from services.dashboard.settings import Config
 from services.dashboard.view import sayable
 from services.errors import Unavailable
-from services.payloads import HistoryGet, HistoryReply
+from services.history_payloads import HistoryGet, HistoryReply
+from services.payloads import Stream
 from services.runner import Post
 
 Part = TypeVar("Part", str, bytes)
+SNAPSHOT = "snapshot.jpg"  # of the camera service, beside its stream
 ANSWER_S = 15.0
 MOST_QUESTIONS = 50  # that wait for the history at once
 
@@ -43,6 +45,7 @@ class House:
     sessions: Sessions = field(init=False)
     closing: list[Callable[[], Awaitable[None]]] = field(default_factory=list)  # what ends with the server
     running: list[Callable[[], Coroutine[None, None, None]]] = field(default_factory=list)  # what runs as long as it
+    scanned: dict[str, bytes] = field(default_factory=dict)  # by camera, the newest analysed picture of its scans
     _questions: dict[str, asyncio.Future[HistoryReply]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -81,6 +84,11 @@ class House:
         if waiting is not None and not waiting.done():
             waiting.set_result(reply)
 
+    def pictured(self, camera: str, jpeg: bytes) -> None:
+        """Takes an analysed picture of a camera that we have."""
+        if camera in self.config.cameras:
+            self.scanned[camera] = jpeg
+
     async def close(self) -> None:
         """Ends what runs for the pages."""
         for one in self.closing:
@@ -96,6 +104,14 @@ class House:
         finally:
             if isinstance(parts, AsyncGenerator):
                 await parts.aclose()
+
+    def picture_of(self, camera: str, name: str = "") -> str | None:
+        """Where the camera service has its stream, or with a name another picture beside it; None: it has not said."""
+        text = self.latest(topics.CAMERA_STREAM.name(cam=camera))
+        if text is None:
+            return None
+        url = Stream.model_validate_json(text).url
+        return f"{url.rpartition('/')[0]}/{name}" if name else url
 
     def latest(self, topic: str) -> str | None:
         """The newest text on a topic."""

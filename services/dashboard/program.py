@@ -28,7 +28,7 @@ def start(config: Config, post: Post) -> Iterator[Dashboard]:
             log.warning("no users are configured: this machine alone may open %s, without a login", server.url)
         else:
             log.info("%s, for %d users", server.url, len(config.users))
-        yield Dashboard(server.spread, server.answered, {"url": server.url, "port": server.port})
+        yield Dashboard(server.spread, server.answered, server.pictured, {"url": server.url, "port": server.port})
     finally:
         server.close()
 

@@ -11,24 +11,25 @@ from collections.abc import Callable, Iterator
 from services import topics
 from services.bus import LOST_TOPIC, Message
 from services.dashboard.view import RATES_S, Entry, View, heard
-from services.payloads import HistoryReply
+from services.history_payloads import HistoryReply
 
 SAY_TOPIC = "/dashboard/say"  # `value`: a Message that a page wants on the bus
 LINK = "/dashboard/broker"  # what pages hear of our own connection: `online`, `offline`
 Spread = Callable[[tuple[Entry, ...]], None]
 Answered = Callable[[HistoryReply], None]
+Pictured = Callable[[str, bytes], None]  # camera, JPEG
 
 
 class Dashboard:
-    """The service; see `services.runner.Service`. `spread` and `answered` may be called from its thread alone."""
+    """The service; see `services.runner.Service`. `spread`, `answered`, `pictured` are called from its thread alone."""
 
-    def __init__(self, spread: Spread, answered: Answered, addresses: dict[str, str | int]) -> None:
+    def __init__(self, spread: Spread, answered: Answered, pictured: Pictured, addresses: dict[str, str | int]) -> None:
         self.subscribes = (*heard(), SAY_TOPIC, LOST_TOPIC)
         self.due: float | None = 0.0
         self.counters: Counter[str] = Counter(said=0, batches=0)
         self.addresses = addresses
         self.view = View()
-        self._spread, self._answered = spread, answered
+        self._spread, self._answered, self._pictured = spread, answered, pictured
         self._rates_at = 0.0
         self._online = False
 
@@ -44,8 +45,10 @@ class Dashboard:
             return
         if message.topic.startswith("history/reply/"):
             self._answered(topics.read(message, now).payload)
-        else:
-            self.view.take(message, now)
+            return
+        self.view.take(message, now)
+        if message.topic.endswith("/scan/image"):
+            self._pictured(topics.find(message.topic)[1]["cam"], message.payload)
 
     def _linked(self, online: bool, now: float) -> None:
         """That something comes shows that the broker is there: our own diagnostics do, every second."""

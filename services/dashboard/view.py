@@ -53,7 +53,7 @@ class View:
         cleared = message.retain and not message.payload
         row = topics.find(message.topic)[0] if cleared else topics.read(message, now).topic
         kind = KINDS[row.kind]
-        text = "" if kind == "b" else message.payload.decode("utf-8", "replace")
+        text = f"{len(message.payload):,} bytes" if kind == "b" else message.payload.decode("utf-8", "replace")
         self._counts[message.topic.partition("/")[0]] += 1
         entry = Entry(message.topic, text[:LONGEST], round(message.received * 1000), kind)
         if kind in "sb":
@@ -88,8 +88,12 @@ class View:
 
 
 def heard(account: str = "dashboard") -> tuple[str, ...]:
-    """The filters of all that the dashboard's account may read, but pictures: those are fetched when wanted."""
-    return tuple(row.filter for row in topics.TABLE if account in row.readers and row.kind is not Kind.BLOB)
+    """The filters of all that the dashboard's account may read, but pictures: those are fetched when wanted.
+
+    An analysed picture of a scan cannot be fetched; it is said once, and only while somebody wants them (ScanImgPub).
+    """
+    rows = (row for row in topics.TABLE if row.kind is not Kind.BLOB or row is topics.CAMERA_SCAN_IMAGE)
+    return tuple(row.filter for row in rows if account in row.readers)
 
 
 def sayable(message: Message, account: str = "dashboard") -> Message:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import json
+
 from services import payloads
 from services.errors import BadMessage
-from services.payloads import HistoryGet, HistoryReply, stamp
-from services.storage import Item, Sample, Storage, reading
+from services.history_payloads import HistoryGet, HistoryReply
+from services.payloads import Point, stamp
+from services.robot_payloads import MissionEvent, MissionResult
+from services.storage import Item, Mission, Sample, Storage, reading
 
 US = 1_000_000
 USUAL = 1000  # samples when nobody says how many
 MOST = 5000  # in one answer: it has to fit into a message of 256 KiB
 DAY_S = 86_400.0
+FROM_EVER = ("samples", "last", "missions")  # the newest of them, when no begin is given
 EARLIEST_S, LATEST_S = 1.0, 2.0**31 - 1  # what the databases hold
 
 
@@ -27,6 +32,10 @@ def _answer(storage: Storage, asked: HistoryGet, now: float) -> HistoryReply:
     limit = min(asked.limit or USUAL, MOST)
     if asked.what == "changes":
         return _changes(storage, asked, since, until, limit)
+    if asked.what == "missions":
+        found = reading.missions(storage, since, until, limit)
+        missions = [(one.robot, _mission(one, one.ended)) for one in found if one.ended is not None]
+        return HistoryReply(id=asked.id, item=None, samples=[], missions=missions)
     item = known(storage, asked.item)
     told = HistoryReply(id=asked.id, item=asked.item, samples=[], unit=item.unit)
     if asked.what == "last":
@@ -46,7 +55,7 @@ def span(asked: HistoryGet, now: float) -> tuple[int, int]:
     if asked.since:
         since = _seconds(asked.since, "since")
     else:
-        since = EARLIEST_S if asked.what in ("samples", "last") and not asked.every else until - DAY_S
+        since = EARLIEST_S if asked.what in FROM_EVER and not asked.every else until - DAY_S
     if since >= until:
         raise BadMessage(f"since: expected a time before {stamp(until)}, got {stamp(since)}")
     return round(since * US), round(until * US) + (not asked.until)
@@ -95,6 +104,19 @@ def _changes(storage: Storage, asked: HistoryGet, since: int, until: int, limit:
     found = reading.changes(storage, since, until, items)[-limit:]
     changed = [(one.item, *_sample(one)) for one in found]
     return HistoryReply(id=asked.id, item=asked.item, samples=[row[1:] for row in changed], changes=changed)
+
+
+def _mission(one: Mission, ended: int) -> MissionResult:
+    """As it was told when it ended."""
+    at = None if one.x is None or one.y is None or one.z is None else Point(x=one.x, y=one.y, z=one.z)
+    story = [MissionEvent(at_s=at_s, state=state, text=text) for at_s, state, text in json.loads(one.story or "[]")]
+    return MissionResult.model_validate(
+        {
+            "id": one.mission, "marker": one.marker, "state": one.state, "reason": one.reason or "", "place": one.place,
+            "position": at, "by": one.seen_by, "elapsed_s": (ended - one.started) / US, "story": story,
+            "stamp": stamp(ended / US),
+        }
+    )  # fmt: skip
 
 
 def _sample(one: Sample) -> tuple[str, float | str]:

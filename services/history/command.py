@@ -17,13 +17,16 @@ from datetime import datetime, tzinfo
 
 from services.errors import BadMessage, ConfigError
 from services.history import answers
-from services.history.plot import Curve, svg
-from services.payloads import HistoryGet, HistoryReply, seconds, stamp
-from services.storage import Address, Item, Mission, Storage, open_storage, reading
+from services.history.plot import HEIGHT, WIDTH, Curve, draw
+from services.history.svg import Svg
+from services.history_payloads import HistoryGet, HistoryReply
+from services.payloads import seconds, stamp
+from services.storage import Address, Item, Mission, Storage, open_ready, reading
 
 UNITS_S = {"s": 1, "m": 60, "h": 3600, "d": 86_400, "w": 604_800}
 POINTS = 1000  # of a plot
 KEPT_S = 300  # the usual width of means that outlive their samples
+SUFFIXES = (".png", ".svg")  # of plots
 US = 1_000_000
 
 
@@ -60,7 +63,7 @@ def every_s(text: str) -> float | None:
 
 def ask(address: Address, asked: HistoryGet) -> HistoryReply:
     """The answer; BadMessage when there is none."""
-    with closing(open_storage(address)) as storage:
+    with closing(open_ready(address)) as storage:
         reply = answers.answer(storage, asked, time.time())
     if reply.error:
         raise BadMessage(reply.error)
@@ -71,7 +74,7 @@ def missions(address: Address, since: str | None, until: str | None, limit: int)
     """The newest missions that began in a span, oldest first: what, how it ended, where, how long in seconds."""
     begin = round(seconds(since) * US) if since else US
     end = round((seconds(until) if until else time.time()) * US)
-    with closing(open_storage(address)) as storage:
+    with closing(open_ready(address)) as storage:
         return [_told(one) for one in reading.missions(storage, begin, end, limit)]
 
 
@@ -144,14 +147,26 @@ def as_json(reply: HistoryReply) -> str:
     return json.dumps(reply.model_dump(exclude_none=True, exclude={"id"}), ensure_ascii=False)
 
 
-def as_plot(address: Address, asked: HistoryGet, zone: tzinfo) -> str:
-    """The numbers of the span (a day, when no begin is given) as SVG; BadMessage when there are none."""
+def as_plot(address: Address, asked: HistoryGet, zone: tzinfo, suffix: str) -> bytes:
+    """The numbers of the span (a day, when no begin is given) as a file of SUFFIXES; BadMessage when there are none."""
     since, until = answers.span(asked.model_copy(update={"every": 1.0}), time.time())
-    with closing(open_storage(address)) as storage:
+    with closing(open_ready(address)) as storage:
         curve = _curve(storage, answers.known(storage, asked.item), since, until)
     if not curve.points:
         raise BadMessage(f"{asked.item}: no numbers from {stamp(since / US)} to {stamp(until / US)}")
-    return svg(curve, zone)
+    return _picture(curve, zone, suffix)
+
+
+def _picture(curve: Curve, zone: tzinfo, suffix: str) -> bytes:
+    if suffix == ".svg":
+        sheet = Svg(WIDTH, HEIGHT)
+        draw(sheet, curve, zone)
+        return sheet.file()
+    from services.paper import Paper  # it brings OpenCV
+
+    paper = Paper(WIDTH, HEIGHT)
+    draw(paper, curve, zone)
+    return paper.png()
 
 
 def _curve(storage: Storage, item: Item, since: int, until: int) -> Curve:

@@ -1,4 +1,7 @@
-"""A plot of an item's numbers as SVG text: axes with local times and the unit. Pure; browsers and editors show it."""
+"""A plot of an item's numbers: axes with local times and the unit. Pure; drawn on any sheet.
+
+Not here: the sheets, SVG text (`svg.py`) and a PNG's pixels (`services/paper.py`).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, tzinfo
-from xml.sax.saxutils import escape
+from typing import Protocol
 
 US = 1_000_000
 WIDTH, HEIGHT = 960, 360
@@ -15,10 +18,24 @@ MOST_TICKS = 8
 MINUTE, HOUR, DAY = 60, 3600, 86_400
 STEPS_S = (1, 5, 15, 30, MINUTE, 5 * MINUTE, 15 * MINUTE, 30 * MINUTE, HOUR, 3 * HOUR, 6 * HOUR, 12 * HOUR, DAY,
            2 * DAY, 7 * DAY, 14 * DAY, 30 * DAY, 90 * DAY, 365 * DAY)  # fmt: skip
-STYLE = (
-    "text{font:12px sans-serif;fill:#333}.axis{stroke:#333}.grid{stroke:#ddd}.band{fill:#9bc4e2}"
-    ".line{fill:none;stroke:#1f5f8b;stroke-width:1.5}.title{font-size:14px;font-weight:bold}"
-)
+Colour = tuple[int, int, int]  # red, green, blue
+INK, GRID, BAND, LINE = (51, 51, 51), (221, 221, 221), (155, 196, 226), (31, 95, 139)
+XY = tuple[float, float]
+
+
+class Sheet(Protocol):
+    """Something to draw on, WIDTH x HEIGHT, the origin at the top left."""
+
+    def line(self, points: Sequence[XY], colour: Colour, width: float = 1.0) -> None:
+        """Straight from point to point."""
+
+    def shape(self, points: Sequence[XY], colour: Colour) -> None:
+        """A filled polygon."""
+
+    def text(
+        self, at: XY, words: str, colour: Colour = INK, size: float = 12.0, weight: int = 400, align: str = "left"
+    ) -> None:
+        """One line of words, `at` the left (or right, or middle) end of its foot."""
 
 
 @dataclass(frozen=True)
@@ -37,21 +54,16 @@ class Curve:
     band: Sequence[tuple[int, float, float]] = ()
 
 
-def svg(curve: Curve, zone: tzinfo) -> str:
-    """The picture."""
+def draw(sheet: Sheet, curve: Curve, zone: tzinfo) -> None:
+    """The plot."""
     frame = _Frame(curve)
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}">',
-        f'<style>{STYLE}</style><rect width="100%" height="100%" fill="#fff"/>',
-        f'<text class="title" x="{LEFT}" y="20">{escape(_title(curve))}</text>',
-        *_value_axis(frame),
-        *_time_axis(frame, curve, zone),
-    ]
+    sheet.text((LEFT, 20), _title(curve), INK, 14, 700)
+    _value_axis(sheet, frame)
+    _time_axis(sheet, frame, curve, zone)
     if curve.band:
-        parts.append(f'<polygon class="band" points="{" ".join(_outline(frame, curve))}"/>')
+        sheet.shape(list(_outline(frame, curve)), BAND)
     if curve.points:
-        parts.append(f'<polyline class="line" points="{" ".join(_line(frame, curve))}"/>')
-    return "\n".join([*parts, "</svg>", ""])
+        sheet.line(list(_line(frame, curve)), LINE, 1.5)
 
 
 def _title(curve: Curve) -> str:
@@ -82,28 +94,28 @@ def _nice(step: float) -> float:
     return next(float(nice * power) for nice in (1, 2, 5, 10) if nice * power >= step * 0.999)
 
 
-def _value_axis(frame: _Frame) -> Iterator[str]:
+def _value_axis(sheet: Sheet, frame: _Frame) -> None:
     for number in range(round((frame.high - frame.low) / frame.step) + 1):
         value = frame.low + number * frame.step
         y = frame.y(value)
-        yield f'<line class="grid" x1="{LEFT}" y1="{y}" x2="{WIDTH - RIGHT}" y2="{y}"/>'
-        yield f'<text x="{LEFT - 8}" y="{y + 4}" text-anchor="end">{value:.6g}</text>'
-    yield f'<line class="axis" x1="{LEFT}" y1="{TOP}" x2="{LEFT}" y2="{HEIGHT - BOTTOM}"/>'
+        sheet.line([(LEFT, y), (WIDTH - RIGHT, y)], GRID)
+        sheet.text((LEFT - 8, y + 4), f"{value:.6g}", INK, 12, 400, "right")
+    sheet.line([(LEFT, TOP), (LEFT, HEIGHT - BOTTOM)], INK)
 
 
-def _time_axis(frame: _Frame, curve: Curve, zone: tzinfo) -> Iterator[str]:
+def _time_axis(sheet: Sheet, frame: _Frame, curve: Curve, zone: tzinfo) -> None:
     bottom = HEIGHT - BOTTOM
-    yield f'<line class="axis" x1="{LEFT}" y1="{bottom}" x2="{WIDTH - RIGHT}" y2="{bottom}"/>'
+    sheet.line([(LEFT, bottom), (WIDTH - RIGHT, bottom)], INK)
     span_s = (curve.until - curve.since) / US
     step_s = next((step for step in STEPS_S if span_s / step <= MOST_TICKS), STEPS_S[-1])
     form = "%Y-%m-%d" if step_s >= DAY else "%H:%M" if step_s >= MINUTE else "%H:%M:%S"
     for moment in _ticks(curve.since, curve.until, step_s, zone):
         x = frame.x(round(moment.timestamp() * US))
-        yield f'<line class="axis" x1="{x}" y1="{bottom}" x2="{x}" y2="{bottom + 5}"/>'
-        yield f'<text x="{x}" y="{bottom + 18}" text-anchor="middle">{moment.strftime(form)}</text>'
+        sheet.line([(x, bottom), (x, bottom + 5)], INK)
+        sheet.text((x, bottom + 18), moment.strftime(form), INK, 12, 400, "middle")
     first, last = (datetime.fromtimestamp(time / US, zone) for time in (curve.since, curve.until))
     days = f"{first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M} {last.tzname() or ''}".rstrip()
-    yield f'<text x="{WIDTH - RIGHT}" y="{bottom + 36}" text-anchor="end">{escape(days)}</text>'
+    sheet.text((WIDTH - RIGHT, bottom + 36), days, INK, 12, 400, "right")
 
 
 def _ticks(since: int, until: int, step_s: int, zone: tzinfo) -> Iterator[datetime]:
@@ -115,17 +127,17 @@ def _ticks(since: int, until: int, step_s: int, zone: tzinfo) -> Iterator[dateti
         yield datetime.fromtimestamp(second, zone)
 
 
-def _line(frame: _Frame, curve: Curve) -> Iterator[str]:
+def _line(frame: _Frame, curve: Curve) -> Iterator[XY]:
     before: float | None = None
     for time, value in curve.points:
         if curve.steps and before is not None:
-            yield f"{frame.x(time)},{before}"
+            yield frame.x(time), before
         before = frame.y(value)
-        yield f"{frame.x(time)},{before}"
+        yield frame.x(time), before
     if curve.steps and before is not None:
-        yield f"{frame.x(curve.until)},{before}"
+        yield frame.x(curve.until), before
 
 
-def _outline(frame: _Frame, curve: Curve) -> Iterator[str]:
-    yield from (f"{frame.x(time)},{frame.y(hi)}" for time, _, hi in curve.band)
-    yield from (f"{frame.x(time)},{frame.y(lo)}" for time, lo, _ in reversed(curve.band))
+def _outline(frame: _Frame, curve: Curve) -> Iterator[XY]:
+    yield from ((frame.x(time), frame.y(hi)) for time, _, hi in curve.band)
+    yield from ((frame.x(time), frame.y(lo)) for time, lo, _ in reversed(curve.band))

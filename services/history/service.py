@@ -1,6 +1,7 @@
 """Answers `history/get` in `handle`, and keeps house in `tick`, a small piece at a time.
 
-While the database is away a question is answered with that. Not here: the answers (`answers.py`).
+While the database is away a question is answered with that. Questions are asked under an account that can only read;
+keeping house has a connection of its own, under another account (`keeper`). Not here: the answers (`answers.py`).
 """
 
 from __future__ import annotations
@@ -9,19 +10,22 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Self
 
-from pydantic import model_validator
+from pydantic import SecretStr, model_validator
 
 from services import topics
 from services.bus import Message
 from services.errors import ConfigError, Unavailable
 from services.history import answers, keeping
 from services.history.keeping import Keep
+from services.history_payloads import HistoryGet, HistoryReply
 from services.home import Home
-from services.payloads import HistoryGet, HistoryReply
 from services.runner import Post
-from services.storage import Storage, open_storage
+from services.section import Section
+from services.storage import Storage, open_ready
+from services.storage.address import Address
 from services.storage.settings import DatabaseSection
 
 log = logging.getLogger(__name__)
@@ -33,9 +37,17 @@ PAUSE_S = 0.02  # between its pieces: the writer and questions come first
 SETTLE_S = 60.0  # after the database was opened
 
 
+class Keeper(Section):
+    """The account that keeps house: it may sum up and delete samples, and nothing else."""
+
+    user: str
+    password: SecretStr
+
+
 class Config(DatabaseSection):
     """The section `history`, with the database of the section persistence; without one the service does not run."""
 
+    keeper: Keeper | None = None  # None: whoever asks keeps house too, and has to be allowed to
     keep: tuple[Keep, ...] = ()  # how long; an item that no line names is kept for ever
     home: Home
 
@@ -44,31 +56,76 @@ class Config(DatabaseSection):
         keeping.by_item(self.keep, self.home)
         return self
 
+    @property
+    def keeping_address(self) -> Address:
+        """The database, for who keeps house."""
+        if self.keeper is None:
+            return self.address
+        return replace(self.address, user=self.keeper.user, password=self.keeper.password.get_secret_value())
+
 
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[History]:
     """The service; a database that is away is waited for."""
-    service = History(lambda: open_storage(config.address), keeping.by_item(config.keep, config.home))
+    lines = keeping.by_item(config.keep, config.home)
+    service = History(lambda: open_ready(config.address), lines, lambda: open_ready(config.keeping_address))
     try:
         yield service
     finally:
         service.close()
 
 
-class History:
-    """The service; see `services.runner.Service`."""
+class Opened:
+    """A connection that is made when it is wanted, and after a failure not again before AGAIN_S have passed."""
 
-    def __init__(self, opener: Callable[[], Storage], lines: Mapping[str, Keep] | None = None) -> None:
+    def __init__(self, opener: Callable[[], Storage]) -> None:
+        self._opener = opener
+        self._storage: Storage | None = None
+        self._not_before = 0.0
+        self._reason = ""
+        self.since: float | None = None
+
+    def get(self, now: float) -> Storage:
+        """The storage; Unavailable when there is none."""
+        if self._storage is None:
+            if now < self._not_before:
+                raise Unavailable(self._reason)
+            try:
+                self._storage = self._opener()
+            except ConfigError as error:
+                raise Unavailable(str(error)) from error
+            self._reason, self.since = "", now
+        return self._storage
+
+    def lost(self, error: Unavailable, now: float) -> None:
+        """It is of no use any more."""
+        self.close()
+        if not self._reason:
+            log.warning("no answers: %s", error)
+        self._reason, self._not_before = str(error), now + AGAIN_S
+
+    def close(self) -> None:
+        """Ends it."""
+        if self._storage is not None:
+            self._storage.close()
+        self._storage = self.since = None
+
+
+class History:
+    """The service; see `services.runner.Service`. `keeper` opens the database for keeping house, else `opener`."""
+
+    def __init__(
+        self,
+        opener: Callable[[], Storage],
+        lines: Mapping[str, Keep] | None = None,
+        keeper: Callable[[], Storage] | None = None,
+    ) -> None:
         self._lines = lines or {}
         self._round: Iterator[int] | None = None  # of keeping house, while one is going on
         self.subscribes = (topics.HISTORY_GET.filter,)
         self.due: float | None = 0.0 if self._lines else None
         self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
-        self._opener = opener
-        self._storage: Storage | None = None
-        self._opened_at: float | None = None
-        self._not_before = 0.0
-        self._reason = ""
+        self._asked, self._house = Opened(opener), Opened(keeper or opener)
 
     def handle(self, message: Message, now: float) -> Iterator[Message]:
         """Answers a question, in every case."""
@@ -87,18 +144,17 @@ class History:
             try:
                 self._keep_house(now)
             except Unavailable as error:
-                self.close()
-                self._lost(error, now)
+                self._house.lost(error, now)
                 self._round, self.due = None, now + ROUND_EVERY_S
         return ()
 
     def _keep_house(self, now: float) -> None:
-        if self._opened_at is None or now - self._opened_at < SETTLE_S:
-            self._opened(now)  # a writer that waited for the database too has rows from before to write
-            self.due = (self._opened_at or now) + SETTLE_S
+        if self._house.since is None or now - self._house.since < SETTLE_S:
+            self._house.get(now)  # a writer that waited for the database too has rows from before to write
+            self.due = (self._house.since or now) + SETTLE_S
             return
         if self._round is None:
-            self._round = keeping.pieces(self._opened(now), self._lines, now)
+            self._round = keeping.pieces(self._house.get(now), self._lines, now)
         rows = next(self._round, None)
         self.counters["pieces"] += rows is not None
         if rows is None:
@@ -106,36 +162,18 @@ class History:
         self.due = now + (ROUND_EVERY_S if rows is None else PAUSE_S)
 
     def close(self) -> None:
-        """Ends the connection."""
-        if self._storage is not None:
-            self._storage.close()
-        self._storage = self._opened_at = self._round = None
+        """Ends the connections."""
+        self._round = None
+        self._asked.close()
+        self._house.close()
 
     def _reply(self, asked: HistoryGet, now: float) -> HistoryReply:
         try:
-            return answers.answer(self._opened(now), asked, now)
+            return answers.answer(self._asked.get(now), asked, now)
         except Unavailable as error:
-            self.close()
-            self._lost(error, now)
+            self._asked.lost(error, now)
             return self._told(asked, f"the database is away: {error}")
 
     def _told(self, asked: HistoryGet, error: str) -> HistoryReply:
         self.counters["unanswered"] += 1
         return HistoryReply(id=asked.id, item=asked.item, samples=[], error=error)
-
-    def _opened(self, now: float) -> Storage:
-        """The storage, opened when that is due."""
-        if self._storage is None:
-            if now < self._not_before:
-                raise Unavailable(self._reason)
-            try:
-                self._storage = self._opener()
-            except ConfigError as error:
-                raise Unavailable(str(error)) from error
-            self._reason, self._opened_at = "", now
-        return self._storage
-
-    def _lost(self, error: Unavailable, now: float) -> None:
-        if not self._reason:
-            log.warning("no answers: %s", error)
-        self._reason, self._not_before = str(error), now + AGAIN_S

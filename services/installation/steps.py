@@ -9,7 +9,7 @@ import os
 import pwd
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,6 +20,7 @@ from services.credentials.folder import Folder, fill
 from services.errors import ApartmentError, ConfigError
 from services.installation import units
 from services.installation.layout import BROKER, DATABASE, GROUP, STATE, SYSTEM, TARGET, UNITS, parts
+from services.whole_file import write_private
 
 SECRETS = SYSTEM / "secrets"
 BROKER_FILES = ("passwords", "acl", "server.crt", "server.key")
@@ -32,17 +33,20 @@ class NotDone(ApartmentError):
 
 @dataclass(frozen=True)
 class Step:
-    """A file to write, or a command to run. `owner` where it is not root's."""
+    """A file to write (or to remove), or a command to run. `owner` where it is not root's."""
 
     path: Path | None = None
     text: str | bytes = field(default="", repr=False)
     mode: int = 0o644
     owner: str = ""
     command: tuple[str, ...] = ()
+    removed: bool = False
 
     def __str__(self) -> str:
         if self.path is None:
             return f"run    {' '.join(self.command)}"
+        if self.removed:
+            return f"remove {self.path}"
         return f"write  {self.path}{f' for {self.owner}' if self.owner else ''} ({self.mode:04o})"
 
 
@@ -69,6 +73,15 @@ def files(apartment: Apartment, python: Path) -> list[Step]:
     ]
 
 
+def gone(wanted: Iterable[Step], root: Path) -> Iterator[Step]:
+    """What an earlier configuration had and this one has not: its units are stopped and removed."""
+    kept = {step.path for step in wanted}
+    for file in sorted((root / UNITS.relative_to("/")).glob("apartment-*.service")):
+        if UNITS / file.name not in kept:
+            yield Step(command=("systemctl", "stop", file.name))
+            yield Step(UNITS / file.name, removed=True)
+
+
 ACCOUNTS = Step(command=("systemd-sysusers",))  # before files are given to them
 
 
@@ -78,7 +91,9 @@ def commands() -> list[Step]:
         ("systemd-tmpfiles", "--create", "apartment.conf"),
         ("systemctl", "daemon-reload"),
         ("systemctl", "enable", TARGET, "apartment-renew.timer"),
+        ("systemctl", "start", "apartment-renew.timer"),
         ("systemctl", "restart", "mosquitto.service"),
+        *((("systemctl", "restart", "mariadb.service"),) if _is_user("mysql") else ()),
     )
     return [Step(command=command) for command in wanted]
 
@@ -116,10 +131,13 @@ def do(step: Step, root: Path) -> None:
             _run(step.command)
         return
     file = root / step.path.relative_to("/")
+    if step.removed:
+        file.unlink(missing_ok=True)
+        return
     file.parent.mkdir(parents=True, exist_ok=True)
     if step.path.parent in (BROKER, DATABASE):
         file.parent.chmod(0o700)
-    access.write_private(file, step.text)
+    write_private(file, step.text)
     if step.owner and root == Path("/") and os.geteuid() == 0:
         user, _, group = step.owner.partition(":")
         if user and not _is_user(user):

@@ -10,14 +10,17 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from prometheus_client import CollectorRegistry, start_http_server
+from prometheus_client import CollectorRegistry, MetricsHandler
 from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.registry import Collector
 
 from services import topics
 from services.bus import Message
+from services.http_doors import Doors, Visitor
 from services.metrics.numbers import Known, Number
 from services.metrics.settings import Config
+
+ASKERS = 8  # connections of one address: Prometheus and a few who look
 
 MEANINGS = {
     "apartment_service_online": ("whether a service is there", ("service",)),
@@ -76,10 +79,9 @@ def start(config: Config) -> Iterator[Metrics]:
     """The page answers until the end of the block."""
     page, registry = Page(), CollectorRegistry()
     registry.register(page)
-    server, thread = start_http_server(config.port, config.host, registry)
+    server = Doors(config.host, config.port, type("Asker", (Visitor, MetricsHandler), {"registry": registry}), ASKERS)
+    server.begin()
     try:
         yield Metrics(page, {"metrics": f"http://{config.host}:{server.server_port}/metrics"})
     finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
+        server.close()

@@ -120,7 +120,7 @@ class Desk:
         for one in seen.markers:
             at = one.position
             spots[one.marker] = None if at is None else (*relation.to_apartment(at.x, at.y), at.z)
-            self.memory.note(Sighting(self.robot, one.marker, "", now, spots[one.marker]))
+            self.memory.note(Sighting(self.robot, one.marker, "", now, spots[one.marker]), now)
         if self.mission is not None:
             wanted = self.mission.marker
             yield from self._happens(Seen(wanted in spots, spots.get(wanted)), now)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from services.mission.state import Mission
 from services.robot_payloads import MissionOrder
+from services.whole_file import write_whole
 
 log = logging.getLogger(__name__)
 
@@ -48,9 +48,6 @@ class Kept:
         if self.file is None:
             return
         try:
-            self.file.parent.mkdir(parents=True, exist_ok=True)
-            fresh = self.file.with_suffix(".new")
-            fresh.write_bytes(FORM.dump_json(book))
-            os.replace(fresh, self.file)
+            write_whole(self.file, FORM.dump_json(book))
         except OSError as error:
             log.error("%s: not written: %s", self.file, error)

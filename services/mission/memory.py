@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
+from services.errors import BadMessage
 from services.mission.state import XYZ
-from services.payloads import Point, ScanResult, seconds, stamp
+from services.payloads import LARGEST, Point, ScanResult, seconds, stamp
 from services.robot_payloads import Whereabouts
+
+MOST = 20_000  # sightings: every marker by two
 
 
 @dataclass(frozen=True)
@@ -29,13 +32,19 @@ class Memory:
     def __init__(self) -> None:
         self._newest: dict[tuple[int, str], Sighting] = {}
 
-    def note(self, sighting: Sighting) -> bool:
-        """Keeps it, unless that one has seen the marker later; whether it was news."""
+    def note(self, sighting: Sighting, now: float) -> bool:
+        """Keeps it, unless that one has seen the marker later; whether it was news.
+
+        Nobody has seen anything later than now: a clock that was ahead would hide all that comes for as long.
+        """
         key = (sighting.marker, sighting.by)
-        known = self._newest.get(key)
-        if known is not None and known.at >= sighting.at:
+        known = self._newest.pop(key, None)
+        if known is not None and known.at >= min(sighting.at, now):
+            self._newest[key] = known
             return False
-        self._newest[key] = sighting
+        self._newest[key] = replace(sighting, at=min(sighting.at, now))
+        if len(self._newest) > MOST:
+            del self._newest[next(iter(self._newest))]
         return True
 
     def of(self, marker: int) -> list[Sighting]:
@@ -48,7 +57,7 @@ class Memory:
             Whereabouts(
                 by=one.by,
                 place=one.place or None,
-                position=None if one.position is None else Point(**dict(zip("xyz", one.position, strict=True))),
+                position=point(one.position),
                 sigma_m=one.sigma_m,
                 age_s=round(max(0.0, now - one.at), 1),
                 stamp=stamp(one.at),
@@ -57,8 +66,17 @@ class Memory:
         ]
 
 
-def by_camera(result: ScanResult) -> Sighting:
-    """What a camera's scan found."""
+def point(at: XYZ | None) -> Point | None:
+    """For a payload; None too where turning it into the apartment's frame has left what a payload can say."""
+    if at is None or any(abs(one) > LARGEST for one in at):
+        return None
+    return Point(**dict(zip("xyz", at, strict=True)))
+
+
+def by_camera(result: ScanResult, camera: str) -> Sighting:
+    """What that camera's scan found; BadMessage when it speaks for another."""
+    if result.camera != camera:
+        raise BadMessage(f"camera: expected {camera}, got {result.camera[:80]!r}")
     position = None if result.position is None else (result.position.x, result.position.y, result.position.z)
     sigma = None if result.covariance is None else sqrt(max(0.0, sum(result.covariance[k][k] for k in range(3))))
     return Sighting(result.camera, result.marker, result.place, seconds(result.stamp), position, _normal(result), sigma)

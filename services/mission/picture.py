@@ -11,9 +11,9 @@ from itertools import pairwise
 
 from services.floor import XY
 from services.mission.chart import Chart
-from services.mission.paper import GREY, INK, PALE, WHITE, Colour, Paper
 from services.mission.plan_view import PlanView
 from services.mission.timeline import Timeline
+from services.paper import GREY, INK, PALE, WHITE, Colour, Paper
 
 WIDTH = 1400
 MARGIN, TOP, MIDDLE = 36.0, 84.0, 640.0

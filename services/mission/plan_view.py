@@ -10,8 +10,8 @@ import numpy as np
 
 from services.floor import FREE, OCCUPIED, UNKNOWN, XY, Grid
 from services.mission.chart import Chart
-from services.mission.paper import GREY, INK, PALE, WHITE, Colour, Paper
 from services.mission.timeline import Goal, Timeline
+from services.paper import GREY, INK, PALE, WHITE, Colour, Paper
 
 FLOOR = {FREE: (252, 252, 250), OCCUPIED: (92, 99, 110), UNKNOWN: (233, 236, 240)}
 Frame = tuple[float, float, float, float]  # left, top, width, height on the sheet

@@ -105,8 +105,8 @@ class Missions:
 
     def _of_house(self, read: topics.Read, now: float) -> Iterator[Message]:
         if read.topic in (topics.CAMERA_MARKER, topics.CAMERA_SCAN_RESULT):
-            sighting = by_camera(read.payload)
-            if self.memory.note(sighting):
+            sighting = by_camera(read.payload, read.levels["cam"])
+            if self.memory.note(sighting, now):
                 for desk in self.desks.values():
                     yield from desk.sighted(sighting, now)
         elif read.topic is topics.CAMERA_ORDER_RESULT:

@@ -7,8 +7,9 @@ from typing import Literal
 from services import topics
 from services.bus import Message
 from services.mission.events import Action, Go, Halt, Scan
+from services.mission.memory import point
 from services.mission.state import ENDS, Mission, Stand
-from services.payloads import Order, Point, stamp
+from services.payloads import Order, stamp
 from services.robot_payloads import (
     MissionEvent,
     MissionOrder,
@@ -81,7 +82,7 @@ def ended(robot: str, mission: Mission, now: float) -> Message:
         state=mission.step,
         reason=mission.reason,
         place=mission.place,
-        position=None if at is None else Point(x=round(at[0], 3), y=round(at[1], 3), z=round(at[2], 3)),
+        position=None if at is None else point((round(at[0], 3), round(at[1], 3), round(at[2], 3))),
         by=robot if mission.step == "found" else None,
         elapsed_s=round(now - mission.began, 1),
         story=[MissionEvent(at_s=one.at_s, state=one.step, text=one.text) for one in mission.story],

@@ -6,7 +6,6 @@ Ours is what begins with our mark. Not here: the texts (`generate.py`).
 from __future__ import annotations
 
 import difflib
-import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from services.errors import ConfigError
 from services.openhab.check import KINDS, read_site
 from services.openhab.generate import MARK
 from services.openhab.versions import Version
+from services.whole_file import write_whole
 
 PLACES = ("things", "items", "rules", "automation/js", "sitemaps", "persistence", "html", "widgets")
 
@@ -71,11 +71,7 @@ def diff(plan: Plan) -> str:
 def apply(plan: Plan) -> None:
     """Writes; who reads meanwhile sees the old file or the new one, never a part."""
     for path in plan.written:
-        file = plan.folder / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        beside = file.with_name(f".{file.name}.{os.getpid()}")
-        beside.write_text(plan.wanted[path], encoding="utf-8")
-        beside.replace(file)
+        write_whole(plan.folder / path, plan.wanted[path])
     for path in plan.gone:
         (plan.folder / path).unlink()
 

@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from services.access import write_private
 from services.peers import free_port, program, running
+from services.whole_file import write_private
 
 PACKAGE = "mariadb-server"
 SOCKET_LIMIT = 100  # a unix socket's path may have 107 bytes

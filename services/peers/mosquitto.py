@@ -13,6 +13,7 @@ from pathlib import Path
 
 from services import access
 from services.peers import answers, free_port, program, running
+from services.whole_file import write_private
 
 CONF = access.CONF
 
@@ -57,7 +58,7 @@ def _passwords(folder: Path, cameras: list[str]) -> dict[str, str]:
         return kept
     passwords = {account: secrets.token_urlsafe(16) for account in access.accounts(cameras)}
     access.write_passwords(folder / "passwords", passwords)
-    access.write_private(plain, json.dumps(passwords))
+    write_private(plain, json.dumps(passwords))
     return passwords
 
 

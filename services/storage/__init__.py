@@ -12,13 +12,19 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from services.errors import Unavailable
+from services.storage import migrate
 from services.storage.address import Address, read_address
 
 __all__ = [
     "Address", "Batch", "CameraOrder", "Diagnostic", "Item", "Mission", "Row", "Sample", "Scan", "SeenTurn", "Sighting",
-    "Storage", "open_plain", "open_storage", "read_address",
+    "Storage", "open_plain", "open_ready", "open_storage", "read_address",
 ]  # fmt: skip
 BACKENDS = {"mysql": "services.storage.mysql", "sqlite": "services.storage.sqlite"}
+VERSIONED = {  # whether there are tables of ours
+    "mysql": "SHOW TABLES LIKE 'schema_version'",
+    "sqlite": "SELECT 1 FROM sqlite_master WHERE name='schema_version'",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,4 +271,24 @@ def open_storage(address: Address | str, folder: Path = Path()) -> Storage:
 def open_plain(address: Address) -> Storage:
     """Opens a database that is not ours, or as its administrator: only `read`, `change`, `quote` and `close` work."""
     storage: Storage = import_module(BACKENDS[address.dialect]).open_plain(address)
+    return storage
+
+
+def open_ready(address: Address) -> Storage:
+    """Opens it as somebody who is not the writer: nothing is made, learnt or brought up to date.
+
+    The calls of `open_plain` work, and those that read. Unavailable until the writer has made the tables ready.
+    """
+    storage = open_plain(address)
+    try:
+        newest = max(migrate.versions(address.dialect))
+        there = storage.read(VERSIONED[address.dialect])
+        found = int(storage.read("SELECT COALESCE(MAX(version), 0) FROM schema_version")[0][0]) if there else 0
+        if found < newest:
+            raise Unavailable(f"the tables are of version {found}, not {newest} yet: the writer brings them up to date")
+        if found > newest:
+            raise migrate.too_new(found, newest)
+    except BaseException:
+        storage.close()
+        raise
     return storage

@@ -29,10 +29,15 @@ def migrate(dialect: str, current: int, apply: Callable[[int, list[str]], None])
     known = versions(dialect)
     newest = max(known)
     if current > newest:
-        raise ConfigError([f"the database has schema version {current}, this program knows {newest}: update it"])
+        raise too_new(current, newest)
     for version, script in known.items():
         if version > current:
             apply(version, script)
+
+
+def too_new(current: int, newest: int) -> ConfigError:
+    """What an older program says of a database that a newer one has brought up to date."""
+    return ConfigError([f"the database has schema version {current}, this program knows {newest}: update it"])
 
 
 def back(dialect: str, current: int, to: int) -> Iterator[tuple[int, list[str]]]:

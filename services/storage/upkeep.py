@@ -6,33 +6,40 @@ Accounts are made on MariaDB and MySQL alone; a SQLite file has none.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 from services.errors import ConfigError
 from services.storage import Address, Storage, open_plain, open_storage
 from services.storage.migrate import back, versions
 
 RIGHTS = "SELECT, INSERT, UPDATE, DELETE, CREATE, ALTER, DROP, INDEX"
+READING = {"": "SELECT"}  # by table; "": all of them
+KEEPING = {"": "SELECT", "sample": "DELETE", "summary": "INSERT, UPDATE, DELETE"}
 VIEW_RIGHTS = "SELECT, CREATE VIEW, SHOW VIEW, DROP"
 ACCOUNT = re.compile(r"[A-Za-z0-9_-]{1,32}")
 HOST = re.compile(r"[A-Za-z0-9_.:%/-]{1,255}")
+ZONES = "mariadb-tzinfo-to-sql /usr/share/zoneinfo | sudo mariadb mysql"
+SOCKETS = ("/run/mysqld/mysqld.sock", "/var/lib/mysql/mysql.sock")  # Debian, others: the administrator comes by it
 LOCAL = ("localhost", "127.0.0.1", "::1")
 
 
 def administrator(address: Address, user: str, password: str | None) -> Address:
-    """The same server, as somebody who may make databases and accounts."""
+    """The same server, as somebody who may make databases and accounts; without a password by the server's socket."""
     if address.dialect == "sqlite":
         raise ConfigError(["a SQLite file has no accounts: who may read the file may read all of it"])
-    return replace(address, user=user, password=password, database="")
+    socket = address.socket
+    if password is None and socket is None and address.host in LOCAL:
+        socket = next((path for path in SOCKETS if Path(path).exists()), None)
+    return replace(address, user=user, password=password, database="", socket=socket)
 
 
 def make_databases(address: Address, admin: Address) -> None:
     """Both databases in UTF-8 and the writer's account; what is there stays. Its password is that of `address`."""
-    host = "localhost" if address.socket or address.host in LOCAL else "%"
     with closing(open_plain(admin)) as server:
-        account = f"{server.quote(_checked(ACCOUNT, address.user))}@{server.quote(host)}"
+        account = _account(server, address)
         secret = server.quote(address.password or "")
         for name in (address.database, address.view_database):
             server.change(f"CREATE DATABASE IF NOT EXISTS `{name}` CHARACTER SET utf8mb4")
@@ -41,6 +48,15 @@ def make_databases(address: Address, admin: Address) -> None:
             f"GRANT {RIGHTS} ON `{address.database}`.* TO {account}",
             f"GRANT {VIEW_RIGHTS} ON `{address.view_database}`.* TO {account}",
         )
+
+
+def make_account(address: Address, admin: Address, rights: Mapping[str, str]) -> None:
+    """An account of a service's own, by what it may do to which table, and nothing else. The tables are there."""
+    with closing(open_plain(admin)) as server:
+        account = _account(server, address)
+        server.change(f"CREATE USER IF NOT EXISTS {account} IDENTIFIED BY {server.quote(address.password or '')}")
+        for table, what in rights.items():
+            server.change(f"GRANT {what} ON `{address.database}`.{f'`{table}`' if table else '*'} TO {account}")
 
 
 def let_read(address: Address, admin: Address, reader: str, password: str, host: str = "localhost") -> None:
@@ -53,6 +69,12 @@ def let_read(address: Address, admin: Address, reader: str, password: str, host:
             f"ALTER USER {account} IDENTIFIED BY {server.quote(password)} REQUIRE {encrypted}",
             f"GRANT SELECT ON `{address.view_database}`.* TO {account}",
         )
+
+
+def _account(server: Storage, address: Address) -> str:
+    """The user of an address, as the server names him."""
+    host = "localhost" if address.socket or address.host in LOCAL else "%"
+    return f"{server.quote(_checked(ACCOUNT, address.user))}@{server.quote(host)}"
 
 
 def _checked(form: re.Pattern[str], text: str) -> str:
@@ -105,5 +127,5 @@ def _look_at_server(storage: Storage) -> Iterator[tuple[bool, str]]:
     yield int(packet) >= 16 * 1024 * 1024, f"max_allowed_packet={packet} (16 MiB or more)"
     yield (
         zone is not None,
-        "named time zones are " + ("there" if zone else "missing: mariadb-tzinfo-to-sql | mariadb mysql"),
+        f"named time zones are {'there' if zone else f'missing: {ZONES}'}",
     )

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 ENOUGH = 16.0  # belief (natural logarithm of odds) of any marker
 ENOUGH_OF_TARGETS = 14.0  # of one that was asked for: what looks like any marker is rarely that one
-FIRST_CORRELATION = 0.4  # of a rough square worth refining: its corners are half a pixel off
+FIRST_CORRELATION = 0.3  # of a rough square with a code in question: its corners are half a pixel off
 FIRST_CONTRAST = 5.0  # grey levels
 FIRST_DARK, FIRST_EDGED = 0.5, 0.4  # shares, as below
 LEAST_CONTRAST = 6.0  # grey levels between light and dark cells; below is noise
@@ -25,10 +25,12 @@ CONTRAST_NOISES = 1.0  # and in standard deviations of the noise
 DARK_BORDER = 0.75  # share of the border's cells that must be dark: a finger may lie over one side
 EDGED = 0.7  # share of the outline with lighter paper beside it
 EDGED_SIDE = 0.2  # of the worst side
+STEPPED = 0.5  # share of the borders within the code at which there is a step; half hidden markers have 0.64
 MARGIN = 0.09  # of the correlation above the next id's
 SURE_CORRELATION = 0.97  # above which neighbours in the dictionary may be nearer
 LIKENESS = 0.62  # share of what is seen within the border that the code explains; one in a hundred markers is below 0.7
 SIMPLER = 3.0  # edges fewer than the dictionary's average that need no more proof
+STRIPES = 12.0  # belief that they take: blinds, shelves and flags are striped
 PER_EDGE = 3.0  # belief that each further one takes
 SMALL_CELL_PX = 2.2  # side of a cell below which proof is taken off
 PER_PX = 20.0
@@ -48,9 +50,11 @@ def beliefs(book: Book, match: Match, proof: Evidence, squares: Array, noise: fl
     left = np.maximum(1 - match.correlation**2, 1e-6)
     chance = np.log(4 * ids) + (cells - 2) / 2 * np.log(left)
     simple = PER_EDGE * np.maximum(book.edges.mean() - SIMPLER - book.edges[match.row], 0)
+    simple = simple + STRIPES * book.stripes[match.row]
     cell_px = _side(squares) / book.modules
     belief = -chance - simple - PER_PX * np.maximum(SMALL_CELL_PX - cell_px, 0)
     sound = (proof.dark >= DARK_BORDER) & (proof.edged >= EDGED) & (proof.worst >= EDGED_SIDE)
+    sound &= proof.stepped >= STEPPED
     sound &= proof.contrast >= np.maximum(LEAST_CONTRAST, CONTRAST_NOISES * noise)
     sound &= (match.correlation - match.second >= MARGIN) | (match.correlation >= SURE_CORRELATION)
     sound &= (simple < SIMPLE) | (cell_px >= SIMPLE_CELL_PX)

@@ -6,6 +6,7 @@ matched to it, so that a marker is read where its cells cannot be told apart any
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -30,13 +31,15 @@ class Book:
     """A dictionary: row k * ids + id of `codes` holds its cells (0, 1) turned clockwise k times.
 
     `seen` are the same with mean 0 and length 1, once for each blur. `edges` counts, for each row, the neighbouring
-    cells that differ, the border's included: few make a figure that ordinary pictures hold too.
+    cells that differ, the border's included: few make a figure that ordinary pictures hold too. `stripes`: whether all
+    of a row's lines of cells are alike, along or across.
     """
 
     inner: int  # cells on a side without the border
     codes: Rows
     seen: tuple[Rows, ...]
     edges: NDArray[np.intp]
+    stripes: NDArray[np.bool_]
 
     @property
     def modules(self) -> int:
@@ -47,6 +50,12 @@ class Book:
     def ids(self) -> int:
         """How many codes there are."""
         return len(self.codes) // 4
+
+    def rows(self, rows: Rows, ids: Collection[int] | None) -> Rows:
+        """Those of these ids, turned four ways; None: all."""
+        if ids is None:
+            return rows
+        return rows[[turns * self.ids + marker for turns in range(4) for marker in sorted(ids)]]
 
 
 @lru_cache(maxsize=8)
@@ -60,7 +69,9 @@ def book(dictionary: str) -> Book:
     seen = tuple(_through(codes, inner, _gauss(blur)) for blur in BLURS)
     whole = grid(codes, inner)[:, 1:-1, 1:-1] > 0.5
     edges = (whole[:, 1:] != whole[:, :-1]).sum(axis=(1, 2)) + (whole[:, :, 1:] != whole[:, :, :-1]).sum(axis=(1, 2))
-    return Book(inner, codes, seen, np.asarray(edges, np.intp))
+    cells = codes.reshape(-1, inner, inner)
+    stripes = (cells == cells[:, :1]).all(axis=(1, 2)) | (cells == cells[:, :, :1]).all(axis=(1, 2))
+    return Book(inner, codes, seen, np.asarray(edges, np.intp), stripes)
 
 
 def predefined(dictionary: str) -> Any:

@@ -116,6 +116,7 @@ class _Search:
         self.dictionary = dictionary
         self.book = codes.book(dictionary)
         self.wanted = wanted
+        self.likely = self.book.rows(self.book.seen[1], wanted)
         self.looks = list(_halved(grey))
         self.candidates: list[_Candidate] = []
         self.believed: list[_Candidate] = []
@@ -178,7 +179,7 @@ class _Search:
         modules = self.book.modules
         cells = reading.cells(look.grey, rough, modules)
         maybe = belief.plausible(reading.appearance(cells))
-        fits = reading.fits(cells.inner[maybe], self.book.seen[1]).max(axis=1)
+        fits = reading.fits(cells.inner[maybe], self.likely).max(axis=1)
         rough = rough[maybe][fits > belief.FIRST_CORRELATION]
         exact = refine_many(look.grey, rough, modules)
         exact = np.where(np.isnan(exact).any(axis=(1, 2), keepdims=True), rough, exact)

@@ -7,6 +7,7 @@ chessboard or a page of text from being one. Where squares come from is `squares
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ AT_ONCE = 400_000  # products: of more, the matrix library makes threads, which 
 VEIL = 5.0  # grey levels of stray light in the darkest print
 SMOOTHED = 0.45  # of the noise's variance is left between pixels
 NOISY = 0.8  # of a square's variance at most is believed to be noise
+STEP = 0.25  # of the contrast: by this much a light cell is lighter than a dark one beside it, also in half a shadow
 LIGHTER = 0.25  # of the contrast: by this much paper is lighter than the border, or it is no edge
 
 
@@ -61,24 +63,30 @@ class Evidence:
     """For each square what does not depend on how well the code fits.
 
     `contrast`: grey levels between light and dark cells; `dark`: share of the border's cells nearer to dark than to
-    light; `edged`: share of the outline with lighter paper beside it, `worst` the same of its worst side.
+    light; `edged`: share of the outline with lighter paper beside it, `worst` the same of its worst side. `stepped`:
+    share of the borders between a light and a dark cell at which the grey really steps; 1 where there are none.
     """
 
     contrast: Array
     dark: Array
     edged: Array
     worst: Array
+    stepped: Array
 
 
 def cells(grey: Picture, squares: Array, modules: int) -> Cells:
     """Looks into squares (n, 4, 2)."""
+    x, y = place(squares, *_spots(modules))
+    means = sample(grey, x, y).reshape(len(squares), len(SPOTS) ** 2, modules, modules).mean(axis=1)
+    return Cells(means, _outside(grey, squares, (np.arange(modules) + 0.5) / modules))
+
+
+@lru_cache(maxsize=8)
+def _spots(modules: int) -> tuple[Array, Array]:
+    """Where cells are sampled, as shares of the square: the first spot of every cell, then the second, ..."""
     middles = np.arange(modules) + 0.5
-    spots = (middles[:, None] + SPOTS).ravel() / modules
-    across, down = np.meshgrid(spots, spots)
-    x, y = place(squares, across.ravel(), down.ravel())
-    count = len(SPOTS)
-    means = sample(grey, x, y).reshape(len(squares), modules, count, modules, count).mean(axis=(2, 4))
-    return Cells(means, _outside(grey, squares, middles / modules))
+    down, across, row, column = np.meshgrid(SPOTS, SPOTS, middles, middles, indexing="ij")
+    return ((column + across) / modules).ravel(), ((row + down) / modules).ravel()
 
 
 def _outside(grey: Picture, squares: Array, share: Array) -> Array:
@@ -121,22 +129,34 @@ def evidence(found: Cells, light: NDArray[np.bool_]) -> Evidence:
     inner = found.inner
     high = (inner * light).sum(axis=1) / np.maximum(light.sum(axis=1), 1)
     low = (inner * ~light).sum(axis=1) / np.maximum((~light).sum(axis=1), 1)
-    return _evidence(found, high, np.where(light.all(axis=1), found.border.mean(axis=(1, 2)), low))
+    low = np.where(light.all(axis=1), found.border.mean(axis=(1, 2)), low)
+    return _evidence(found, high, low, _stepped(found.grey[:, 1:-1, 1:-1], light, STEP * (high - low)))
 
 
 def appearance(found: Cells) -> Evidence:
     """The same before any code is known: the lightest and darkest cells stand for the light and the dark ones."""
     inner = np.sort(found.inner, axis=1)
     few = max(1, inner.shape[1] // 8)
-    return _evidence(found, inner[:, -few:].mean(axis=1), inner[:, :few].mean(axis=1))
+    return _evidence(found, inner[:, -few:].mean(axis=1), inner[:, :few].mean(axis=1), np.ones(len(inner)))
 
 
-def _evidence(found: Cells, high: Array, low: Array) -> Evidence:
+def _stepped(inner: Array, light: NDArray[np.bool_], least: Array) -> Array:
+    """A picture that grows lighter from one side to the other is like many codes, but it has no steps."""
+    there, good, light = np.zeros(len(inner)), np.zeros(len(inner)), light.reshape(inner.shape)
+    for axis in (1, 2):
+        change = np.diff(light.astype(np.int8), axis=axis)
+        step = np.diff(inner, axis=axis) * change
+        there += (change != 0).sum(axis=(1, 2))
+        good += (step > np.maximum(least, 0)[:, None, None]).sum(axis=(1, 2))
+    return np.where(there > 0, good / np.maximum(there, 1), 1.0)
+
+
+def _evidence(found: Cells, high: Array, low: Array, stepped: Array) -> Evidence:
     contrast = high - low
     dark = (found.border < ((high + low) / 2)[:, None, None]).mean(axis=(1, 2))
     edged = found.outside - found.border > LIGHTER * np.maximum(contrast, 1.0)[:, None, None]
     sides = edged.mean(axis=2)
-    return Evidence(contrast, dark, sides.mean(axis=1), sides.min(axis=1))
+    return Evidence(contrast, dark, sides.mean(axis=1), sides.min(axis=1), stepped)
 
 
 def likeness(grey: Picture, square: Array, faces: NDArray[np.float32], noise: float) -> float:

@@ -20,6 +20,7 @@ Picture = NDArray[np.uint8]
 WINDOW = 7  # px of the threshold's neighbourhood: wider ones join a small marker to what is beside it
 STEPS = (3.0, 8.0)  # least and most grey levels by which a pixel must be darker than its neighbourhood
 NOISES = 2.5  # the same in standard deviations of the noise: more lets specks grow into the outline
+SPECK_STEPS = (1, 2)  # of so many pixels or fewer is a speck: in this order, since one speck is another's company
 ROUGH = 0.03  # of an outline's length: how far it may leave the straight line between two corners
 FINEST_PX = 1.0  # and never less: an outline goes from pixel to pixel
 LEAST_ANGLE = 0.17  # sine between neighbouring sides: a square seen at more than 75 degrees cannot be read
@@ -49,19 +50,32 @@ def squares(grey: Picture, least_px: float, *, window: int = WINDOW, step: float
         return np.zeros((0, 4, 2))
     below = float(np.clip(NOISES * noise(grey), *STEPS)) if step is None else step
     dark = cv2.adaptiveThreshold(grey, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, below)
-    outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    outlines, _ = cv2.findContours(_without_specks(np.asarray(dark, np.uint8)), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     longest, area = 4 * max(grey.shape), least_px**2 * LEAST_ANGLE
     fours, others = [], []
-    for outline in outlines:
-        if 3 * least_px < len(outline) < longest and cv2.contourArea(outline, True) < -area:  # else a hole's
-            corners = cv2.approxPolyDP(outline, max(ROUGH * len(outline), FINEST_PX), True)[:, 0]
+    for outline, length in zip(outlines, map(len, outlines), strict=True):
+        if 3 * least_px < length < longest and cv2.contourArea(outline, True) < -area:  # else a hole's
+            corners = cv2.approxPolyDP(outline, max(ROUGH * length, FINEST_PX), True)[:, 0]
             if len(corners) == 4:
                 fours.append(corners)
             elif 4 < len(corners) <= MOST_CORNERS or len(corners) == 3:
-                finer = cv2.approxPolyDP(outline, max(ROUGH / 2 * len(outline), FINEST_PX), True)[:, 0]
+                finer = cv2.approxPolyDP(outline, max(ROUGH / 2 * length, FINEST_PX), True)[:, 0]
                 others.append(finer if 4 < len(finer) <= MOST_CORNERS else corners)
     found = [np.array(fours, float).reshape(-1, 4, 2)[:, ::-1], _by_sides(others)]
     return _sound(np.concatenate(found), least_px)
+
+
+def _without_specks(dark: Picture) -> Picture:
+    """Only pixels in company: noise alone makes tens of thousands of specks, and each would be an outline.
+
+    From a pixel of something larger, its nearest neighbours in it lie within as many steps as there are of them: no
+    outline of anything larger than a speck is changed.
+    """
+    for steps in SPECK_STEPS:
+        window = (2 * steps + 1, 2 * steps + 1)
+        company = cv2.boxFilter(dark & 1, -1, window, normalize=False, borderType=cv2.BORDER_CONSTANT)
+        dark = dark * (np.asarray(company) > steps)
+    return dark
 
 
 def _sound(candidates: Array, least_px: float) -> Array:
@@ -83,28 +97,36 @@ def _by_sides(polygons: list[NDArray[Any]]) -> Array:
     many = [polygon for polygon in polygons if len(polygon) > 4]
     if not many:
         return np.zeros((0, 4, 2))
-    start, along = np.zeros((2, len(many), SIDES_TRIED, 2))
+    points = np.zeros((len(many), MOST_CORNERS, 2))
     for row, polygon in enumerate(many):
-        points = polygon[::-1].astype(float)
-        extent = np.concatenate((points[1:], points[:1])) - points
-        chosen = np.sort(np.argsort(-np.hypot(extent[:, 0], extent[:, 1]))[:SIDES_TRIED])
-        start[row, : len(chosen)], along[row, : len(chosen)] = points[chosen], extent[chosen]
-    start, along = start[:, FOURS], along[:, FOURS]  # (n, fours, 4, 2)
-    length = np.linalg.norm(along, axis=3)
-    normal = np.stack((-along[..., 1], along[..., 0]), axis=3) / np.maximum(length, 1e-9)[..., None]
-    distance = (normal * start).sum(axis=3)
-    before, before_distance = np.roll(normal, 1, axis=2), np.roll(distance, 1, axis=2)
+        points[row, : len(polygon)] = polygon[::-1]
+    rows, count = np.arange(len(many))[:, None], np.array([len(polygon) for polygon in many])[:, None]
+    side = np.arange(MOST_CORNERS)
+    extents = np.where((side < count)[..., None], points[rows, (side + 1) % count] - points, 0.0)
+    chosen = np.sort(np.argsort(-np.linalg.norm(extents, axis=2), axis=1, kind="stable")[:, :SIDES_TRIED], axis=1)
+    start, along = points[rows, chosen], extents[rows, chosen]  # (n, sides, 2)
+    ahead = along / np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-9)
+    sine = ahead[:, :, None, 0] * ahead[:, None, :, 1] - ahead[:, :, None, 1] * ahead[:, None, :, 0]
+    around = (sine[:, FOURS, np.roll(FOURS, -1, axis=1)] > LEAST_ANGLE).all(axis=2)  # (n, fours): always to the right
+    corners, share = np.zeros((*around.shape, 4, 2)), np.zeros(around.shape)
+    corners[around], share[around] = _joined(start[:, FOURS][around], along[:, FOURS][around])
+    best = np.argsort(-share, axis=1)[:, :2]
+    return corners[rows, best][share[rows, best] > 0]
+
+
+def _joined(start: Array, along: Array) -> tuple[Array, Array]:
+    """Squares (n, 4, 2) of four sides each, made longer, and the share that the sides make up; 0: too little."""
+    length = np.linalg.norm(along, axis=2)
+    normal = np.stack((-along[..., 1], along[..., 0]), axis=2) / length[..., None]
+    distance = (normal * start).sum(axis=2)
+    before, before_distance = np.roll(normal, 1, axis=1), np.roll(distance, 1, axis=1)
     slant = before[..., 0] * normal[..., 1] - before[..., 1] * normal[..., 0]
-    slant = np.where(np.abs(slant) < 1e-6, 1e-6, slant)
     x = (before_distance * normal[..., 1] - distance * before[..., 1]) / slant
     y = (before[..., 0] * distance - normal[..., 0] * before_distance) / slant
-    corners = np.stack((x, y), axis=3)
-    sides = np.roll(corners, -1, axis=2) - corners
-    onward = ((sides * along).sum(axis=3) > 0).all(axis=2) & (length > 0).all(axis=2)
-    around = np.linalg.norm(sides, axis=3)
+    corners = np.stack((x, y), axis=2)
+    sides = np.roll(corners, -1, axis=1) - corners
+    onward = ((sides * along).sum(axis=2) > 0).all(axis=1)
+    around = np.linalg.norm(sides, axis=2)
     covered = np.minimum(length / np.maximum(around, 1e-9), 1.2)
-    share = (covered * around).sum(axis=2) / np.maximum(around.sum(axis=2), 1e-9)
-    share = np.where(onward & (covered.min(axis=2) > 0.15) & (share >= COVERED), share, 0.0)
-    best = np.argsort(-share, axis=1)[:, :2]
-    rows = np.arange(len(many))[:, None]
-    return corners[rows, best][share[rows, best] > 0]
+    share = (covered * around).sum(axis=1) / np.maximum(around.sum(axis=1), 1e-9)
+    return corners, np.where(onward & (covered.min(axis=1) > 0.15) & (share >= COVERED), share, 0.0)

@@ -107,6 +107,6 @@ def test_a_question_that_an_intruder_left_retained_is_refused_by_the_service_tha
                 intruder.pump()
                 return any(message.topic == f"history/reply/{name}" for message in intruder.seen)
 
-            wait_until(lambda: answered("left") or runner.counters["bad"] == 1, "what was left", LIMIT_S)
+            wait_until(lambda: answered("left") or runner.counters["bad"] > 0, "what was left", LIMIT_S)
             wait_until(lambda: intruder.say(topic, asked) or answered("asked"), "an answer", LIMIT_S)  # type: ignore[func-returns-value]
             assert not answered("left")

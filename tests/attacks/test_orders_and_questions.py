@@ -74,6 +74,18 @@ def test_json_without_a_bottom_is_a_bad_message(row: topics.Topic, payload: byte
         topics.read(Message(topic, payload, received=T), T)
 
 
+@pytest.mark.parametrize("number", ["1e301", "-1e308", "1e999"])
+def test_a_goal_beyond_all_numbers_is_refused_and_the_camera_goes_on(tmp_path: Path, number: str) -> None:
+    """It would come back in the answer, where such a number is no number."""
+    flat = Flat(tmp_path, places=Path()).online()
+    with pytest.raises(BadMessage, match="pan"):
+        topics.read(Message("camera/ip1/position/set", f'{{"pan": {number}}}'.encode(), received=T), T)
+    with pytest.raises(BadMessage, match="x: "):
+        topics.read(Message("robot/tiago/goto", f'{{"x": {number}, "y": 1}}'.encode(), received=T), T)
+    flat.send("camera/ip1/position/set", b'{"pan": 1e300, "id": "1"}')
+    assert flat.states("1") == ["refused"]
+
+
 @pytest.mark.parametrize("row", [pytest.param(row, id=row.pattern) for row in TABLE])
 def test_what_is_too_large_is_refused_before_it_is_looked_at(row: topics.Topic) -> None:
     special = {"marker": "1", "attribute": "$name", "trait": "$name"}

@@ -118,6 +118,23 @@ def test_what_a_robot_says_arrives_or_is_refused_with_the_reason(master: ros.Mas
             one.result()
 
 
+def test_a_robot_that_turns_the_camera_too_fast_or_too_far_is_told_so(master: ros.Master, run_bridge: Run) -> None:
+    bridge = run_bridge(master.env, LAMP)
+    bridge.registers(1)
+    words = ("pub", "-r", "200", "/ip_camera_order", KEY_VALUE, "{key: Move, value: Left}")
+    flood = subprocess.Popen(["rostopic", *words], env={**os.environ, **master.env}, stdout=subprocess.DEVNULL)
+    try:
+        bridge.says("diagnostics/bridge", lambda text: "at most 20 a second" in text)
+        pub(master, "/ip_camera_order", KEY_VALUE, "{key: Move, value: Stop}")
+        bridge.says("camera/ip1/order/Move", lambda text: "Stop" in text)
+    finally:
+        flood.send_signal(signal.SIGINT)
+        flood.wait(PATIENCE_S)
+    pub(master, "/ip_camera_position", "geometry_msgs/Point", "{x: 400, y: 0, z: 0}")
+    bridge.says("diagnostics/bridge", lambda text: "expected x from -360 to 360" in text)
+    assert not [text for _, topic, text in bridge.said if topic == "camera/ip1/position/set"]
+
+
 def test_without_a_master_at_the_start_nothing_is_lost(tmp_path: Path, run_bridge: Run) -> None:
     absent = ros.Master(free_port(), tmp_path / "ros")
     absent.folder.mkdir()

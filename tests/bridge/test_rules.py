@@ -178,6 +178,11 @@ def test_what_cannot_be_said_on_the_bus_is_told(payload: Any, fields: Any, told:
         (COMMAND, {"mqtt": "home/+/command"}, r"no \+"),
         (COMMAND, {"payload": None}, "expected payload"),
         (COMMAND, {"latch": True}, "neither fields"),
+        (COMMAND, {"most": 0}, "greater"),
+        (COMMAND, {"ranges": {"x": [5, 1]}}, "low, high"),
+        (COMMAND, {"ranges": {"x": [0, "inf"]}}, "finite"),
+        (UPDATES, {"most": 5}, "neither payload"),
+        (UPDATES, {"ranges": {"x": [0, 1]}}, "neither payload"),
     ],
 )
 def test_a_rule_that_cannot_work_is_refused(base: Any, changes: Any, told: str) -> None:

@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from services.bridge import Config, start
+from services.bridge import Config, limits, start
 from services.bridge.node import LINK, Link
+from services.bridge.rules import Rule
 from services.bridge.service import Bridge, GivenUp
 from services.bridge.simulated import SimulatedNode
 from services.bus import Message
@@ -321,3 +322,45 @@ def test_a_robots_word_waits_too_where_its_rule_says_so(lab: Driven) -> None:
     assert says(2.0, NOW + 0.1) == says(3.0, NOW + 0.2) == []
     later = [message for message in lab.service.tick(NOW + 0.6) if message.topic == "lab/goal"]
     assert [json.loads(message.payload)["x"] for message in later] == [3.0]
+
+
+def test_more_than_a_rule_allows_is_refused_and_told_until_the_second_is_over(bridge: Driven) -> None:
+    for number in range(20):
+        assert bridge.robot_says("/ip_camera_order", "Move", "Left", NOW + number / 1000)
+    with pytest.raises(BadMessage, match="at most 20 a second"):
+        bridge.robot_says("/ip_camera_order", "Move", "Right", NOW + 0.03)
+    assert "at most 20 a second" in bridge.own_health(NOW + 0.5)["message"]
+    assert bridge.robot_says("/ip_camera_order", "Move", "Right", NOW + 0.1)
+    assert bridge.robot_says("/ip2/ip_camera_order", "Move", "Right", NOW + 0.03), "each topic has its own"
+
+
+def test_a_stop_is_never_one_too_many(bridge: Driven) -> None:
+    for _ in range(50):
+        ((topic, order),) = bridge.robot_says("/ip_camera_order", "Move", "Stop")
+        assert (topic, json.loads(order)["value"]) == ("camera/ip1/order/Move", "Stop")
+    assert bridge.robot_says("/ip_camera_order", "Goto", "Kitchen")
+
+
+@pytest.mark.parametrize(("x", "z"), [(361.0, 0.0), (-1e9, 0.0), (10.0, 8.5), (float("nan"), 0.0)])
+def test_a_position_out_of_range_goes_nowhere(bridge: Driven, x: float, z: float) -> None:
+    bridge.node.send("/ip_camera_position", {"x": x, "y": 0.0, "z": z})
+    with pytest.raises(BadMessage):
+        list(bridge.service.handle(bridge.take()[0], NOW))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [("Temp", "21.5 °C", None), ("temp", "28", None), ("Temp", "UNDEF", None), ("Other", "99", None),
+     ("Temp", "28.1", "from 5 to 28"), ("Temp", "-3 °C", "from 5 to 28"), ("Temp", ".5e9", "from 5 to 28")],
+)  # fmt: skip
+def test_a_range_is_of_the_value_that_belongs_to_a_key(key: str, value: str, told: str | None) -> None:
+    rule = Rule.model_validate(
+        {"direction": "to_mqtt", "ros": "a", "type": "diagnostic_msgs/KeyValue", "mqtt": "lab/{key}",
+         "payload": "{value}", "ranges": {"Temp": [5, 28]}}
+    )  # fmt: skip
+    words = {"key": key, "value": value}
+    if told is None:
+        limits.check(rule, words, limits.Allowance(), NOW)
+    else:
+        with pytest.raises(BadMessage, match=told):
+            limits.check(rule, words, limits.Allowance(), NOW)

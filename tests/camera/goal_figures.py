@@ -6,17 +6,31 @@ Virtual time, on the same wire words and the same simulated motors: no frame rat
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from statistics import median
 
 import httpx
 
 from services.simulators.camera.firmwares import PROFILES
+from services.simulators.world import load
 from tests import bounds
-from tests.camera.goals import LIMITS, START, Outcome, Rig, constants, outcomes, random_goals, wanted, with_presets
-from tests.camera.least_time import least_time
+from tests.camera.goals import (
+    LIMITS,
+    START,
+    WORLD,
+    Outcome,
+    Rig,
+    constants,
+    outcomes,
+    random_goals,
+    wanted,
+    with_presets,
+)
+from tests.camera.least_time import Hops, least_by_hops, least_time
 from tests.camera.report_controller import ReportController
 
 SEED = 1
+RELATIVE = "ip2m-841b-strict"  # it takes a relative position, and no other
 COMPARED = "ip3m-941w-2019"
 THE_REPORT_S_GOALS = 10
 
@@ -46,7 +60,27 @@ def rows() -> list[Row]:
     bound = {name: wanted(profile) for name, profile in PROFILES.items()}
     ours = [_row(name, one, bound[name]) for name, one in found.items()]
     few = _row(f"{COMPARED}, the first {THE_REPORT_S_GOALS}", found[COMPARED][:THE_REPORT_S_GOALS], bound[COMPARED])
-    return [*ours, *_presets(goals), few, _row(f"{COMPARED}, the report's controller", the_report_s(), None)]
+    return [
+        *ours,
+        bound_by_hops(goals),
+        *_presets(goals),
+        few,
+        _row(f"{COMPARED}, the report's controller", the_report_s(), None),
+    ]
+
+
+def bound_by_hops(goals: list[tuple[float, float, float]]) -> Row:
+    """What the same goals take at least by the relative form, reckoned from the simulator's constants."""
+    profile, lens = PROFILES[RELATIVE], load(WORLD).cameras["ip1"].lens
+    plane = (lens.width / (2 * lens.fx), lens.height / (2 * lens.fy))
+    hops, motors = Hops(plane, profile.latency_s, profile.latency_spread_s), constants(profile)
+    ways = list(pairwise(goals))
+    seconds = [least_by_hops(here, goal, motors, hops) for here, goal in ways]
+    ratios = [one / least_time(*way, motors) for one, way in zip(seconds, ways, strict=True)]
+    name = f"{RELATIVE}, least by the relative form"
+    return Row(
+        name, len(ways), median(seconds), median(ratios), max(ratios), 0, 0, 0, 0, 0.0, 0, bounds.MEDIAN_POSITIONS
+    )
 
 
 def _presets(goals: list[tuple[float, float, float]]) -> list[Row]:

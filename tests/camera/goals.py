@@ -212,6 +212,8 @@ def wanted(profile: Profile) -> float:
     """The bound of the median of time over least time."""
     if profile.position_abs == "pan-only":
         return bounds.MEDIAN_PAN_ONLY
+    if profile.position_relative == "works" and not positions(profile):
+        return bounds.MEDIAN_RELATIVE
     return bounds.MEDIAN_POSITIONS if positions(profile) else bounds.MEDIAN_START_STOP
 
 

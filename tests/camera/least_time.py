@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import atan, degrees, sqrt
 
 Pose = tuple[float, float, float]
 
@@ -35,6 +35,38 @@ def least_time(here: Pose, goal: Pose, constants: Constants) -> float:
     pans = [pan % 360 if pan % 360 <= middle else pan % 360 - 360 for pan in (here[0], goal[0])]
     ways = (abs(pans[1] - pans[0]), abs(goal[1] - here[1]), abs(goal[2] - here[2]))
     return max(map(alone, ways, constants.speeds, constants.accelerations))
+
+
+@dataclass(frozen=True)
+class Hops:
+    """A relative form: the tangents of its whole scale at the widest zoom; answers, seconds, and what they vary by."""
+
+    plane: tuple[float, float]
+    answer: float
+    varies: float
+    near: float = 0.42  # degrees: as near as that a reading has arrived
+
+
+def least_by_hops(here: Pose, goal: Pose, constants: Constants, hops: Hops) -> float:
+    """Seconds that a goal takes by the relative form at least, as is to be expected, with a reading that verifies it.
+
+    One answer before anything turns and one for the reading at rest. What one hop from rest does not reach needs one
+    in flight, and that ends beside by the speed times what its answer was sooner or later: even over that whole range.
+    So it needs another from rest, unless it was near; that one is taken to be answered at the very moment of rest.
+    """
+    larger = 1.0 + here[2] / 4.0
+    middle = sum(constants.dead_arc) / 2
+    pans = [pan % 360 if pan % 360 <= middle else pan % 360 - 360 for pan in (here[0], goal[0])]
+    ways = (abs(pans[1] - pans[0]), abs(goal[1] - here[1]))
+    least = least_time(here, goal, constants) + 2 * hops.answer
+    reaches = [degrees(atan(tangent / larger)) for tangent in hops.plane]
+    if all(way <= reach for way, reach in zip(ways, reaches, strict=True)):
+        return least
+    lead = max((0, 1), key=lambda axis: alone(ways[axis], constants.speeds[axis], constants.accelerations[axis]))
+    most = min(constants.speeds[lead], sqrt(ways[lead] * constants.accelerations[lead])) * hops.varies
+    steps = [most * (step + 0.5) / 100 for step in range(100)]
+    again = [alone(off, constants.speeds[lead], constants.accelerations[lead]) for off in steps if off > hops.near]
+    return least + sum(again) / len(steps)
 
 
 @dataclass(frozen=True)

@@ -86,6 +86,7 @@ def test_the_answer_also_goes_where_the_one_who_asked_wants_it(flat: Flat) -> No
         ("Dance", "now", "no order 'Dance'"),
         ("RTSP", "ON", "not available"),
         ("AudioPlay", "../secret.wav", "a file in the audio folder"),
+        ("AudioPlay", "é" * 128, "a file in the audio folder"),
         ("AudioRec", "-1", "seconds from 0 to 600"),
         ("VideoMode", "sepia", "expected color, bw, auto, scan"),
         ("Move", "Sideways", "expected Stop"),

@@ -43,6 +43,7 @@ def page(browser: Browser, url: str, *, size: Any = None, scheme: Any = "light")
     complaints: list[str] = []
     context = browser.new_context(base_url=url, viewport=size or DESKTOP, color_scheme=scheme, locale="en-GB")
     context.set_default_timeout(WAIT_MS)
+    context.add_init_script(PRESSING)
     made = context.new_page()
     made.on("pageerror", lambda error: complaints.append(str(error)))
     made.on("console", lambda said: complaints.extend(_complaint(said)))
@@ -78,3 +79,36 @@ def faults(page: Page) -> list[str]:
         if one["impact"] in ("serious", "critical")
         for node in one["nodes"]
     ]
+
+
+PRESSING = """(() => {
+  const CONTROLS = "button, input, select, textarea, a[href], summary, " +
+    "[role=button], [role=application], [role=treeitem]";
+  const TYPED = "input:not([type=checkbox]), textarea, select"; // a click there only puts the cursor in
+  const LISTS = {".places button": "a place", ".items li input": "an item", ".items li a": "an item's table",
+    ".topic .name": "a topic", "[role=treeitem]": "a component", summary: "a past mission"};
+  const nameOf = (element) => {
+    for (const [selector, name] of Object.entries(LISTS)) if (element.matches(selector)) return name;
+    if (element.matches(".line-link")) return element.hash;
+    if (element.matches("[data-item]")) return element.dataset.item;
+    const told = element.getAttribute("aria-label") ?? element.labels?.[0]?.textContent ?? element.textContent;
+    return (element.matches("[aria-pressed], .quiet") ? told.split(":")[0] : told).trim();
+  };
+  const inside = (root) => [...new Set([...document.querySelector(root).querySelectorAll(CONTROLS)].map(nameOf))];
+  const pressed = new Set();
+  const note = (event) => {
+    const control = event.target.closest?.(CONTROLS);
+    if (control && !(event.type === "click" && control.matches(TYPED))) pressed.add(nameOf(control));
+  };
+  for (const type of ["click", "change", "input", "pointerdown", "keydown"]) addEventListener(type, note, true);
+  window.unpressed = (root) => inside(root).filter((name) => !pressed.has(name)).sort();
+})()"""
+
+
+def unpressed(page: Page, root: str = "main") -> list[str]:
+    """The controls that are shown and that nobody has used since the page was loaded; those of a list count as one.
+
+    The page was made with `PRESSING` as its first script.
+    """
+    found: list[str] = page.evaluate("root => window.unpressed(root)", root)
+    return found

@@ -21,7 +21,7 @@ from services.config import BusSettings
 from services.simulated import Simulated, parts_of, services_of, start_mosquitto
 from services.storage import Batch, Sample, open_storage, reading
 from tests.dashboard import browser as browsers
-from tests.dashboard.browser import DESKTOP, PHONE, VIEWS, page, view
+from tests.dashboard.browser import DESKTOP, PHONE, VIEWS, WAIT_MS, page, view
 
 FORMS = {"desktop": (DESKTOP, "light"), "phone": (PHONE, "light"), "dark": (DESKTOP, "dark")}
 PLACES = ("Sofa", "TV", "Living room", "Kitchen", "Dining")
@@ -31,6 +31,7 @@ SOME_S = 0.5  # until the last picture and the fonts are there
 def main(folder: Path) -> None:
     """Takes them all."""
     folder.mkdir(parents=True, exist_ok=True)
+    expect.set_options(timeout=WAIT_MS)
     with tempfile.TemporaryDirectory(prefix="pictures-") as name, parts_of(Path(name), real=False) as parts:
         parts.broker.close()
         start_mosquitto(parts)
@@ -69,6 +70,7 @@ def busy(flat: Simulated, bus: Client) -> None:
     for place in PLACES:
         bus.order("ip1", "Goto", place)
         bus.collect(2.5)
+    bus.order("ip1", "ScanImgPub", True)
     bus.order("ip1", "Scan", {"targets": [582, 17], "places": ["Living room", "Kitchen"]}, timeout_s=200.0)
     bus.say("mission/tiago/order", '{"find": 582, "id": "pictured"}')
     bus.until(lambda one: one.topic == "mission/tiago/result", 200.0)

@@ -6,18 +6,16 @@ import json
 import re
 import statistics
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from services import peers
-from services.client import Client, connected
-from services.config import BusSettings
-from services.simulated import Simulated, parts_of, services_of, start_mosquitto
-from tests.dashboard import browser as browsers
-from tests.dashboard.browser import DESKTOP, PHONE, VIEWS, WAIT_MS, faults, page, view
+from services.client import Client
+from services.simulated import Simulated
+from tests.dashboard.browser import DESKTOP, PHONE, VIEWS, WAIT_MS, faults, page, unpressed, view
+from tests.dashboard.conftest import address
 from tests.dashboard.parts import PASSWORD, USERS, running
 
 pytestmark = [pytest.mark.chromium, pytest.mark.mosquitto]
@@ -25,45 +23,6 @@ TARGET = 582
 ROUNDS = 5
 LONG_MS = 120_000  # a scan or a mission on a busy machine
 expect.set_options(timeout=WAIT_MS)
-
-
-@pytest.fixture(scope="module")
-def flat(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Simulated]:
-    """With mosquitto; SQLite and no ROS, which pages do not meet."""
-    with parts_of(tmp_path_factory.mktemp("parts"), real=False) as parts:
-        parts.broker.close()
-        try:
-            start_mosquitto(parts)
-        except peers.Missing as missing:
-            pytest.skip(str(missing))
-        with services_of(tmp_path_factory.mktemp("flat"), parts, without=("bridge",)) as made:
-            yield made
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    try:
-        with browsers.chromium() as made:
-            yield made
-    except peers.Missing as missing:
-        pytest.skip(str(missing))
-
-
-@pytest.fixture
-def bus(flat: Simulated) -> Iterator[Client]:
-    """Somebody without a name, who may hear and say everything at the private broker."""
-    with connected(BusSettings(port=flat.parts.broker_port), ["#"]) as client:
-        yield client
-
-
-@pytest.fixture
-def shown(flat: Simulated, chromium: Browser) -> Iterator[Page]:
-    with page(chromium, address(flat)) as made:
-        yield made
-
-
-def address(flat: Simulated) -> str:
-    return str(flat.ready["dashboard"]["url"]).rstrip("/")
 
 
 def switched(page: Page, item: str) -> Any:
@@ -303,6 +262,7 @@ def test_a_login_is_refused_then_granted_and_who_only_looks_has_no_controls(
         shown.get_by_label("Name").fill("vic")
         shown.get_by_label("Password").fill("wrong")
         shown.get_by_role("button", name="Log in").click()
+        assert unpressed(shown) == []
         expect(shown.get_by_role("alert")).to_have_text("wrong name or password")
         assert faults(shown) == []
         shown.get_by_label("Password").fill(PASSWORD)

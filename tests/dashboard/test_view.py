@@ -89,8 +89,9 @@ def test_what_it_may_say_goes_out_as_its_topic_wants() -> None:
     assert (message.retain, message.qos, message.expires_s) == (False, 1, 5)
 
 
-def test_pictures_are_not_listened_to() -> None:
+def test_of_pictures_only_those_are_listened_to_that_cannot_be_fetched() -> None:
     assert "camera/+/snapshot" not in heard()
+    assert "camera/+/scan/image" in heard()
     assert "home/+/state" in heard()
 
 

@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 import re
 import time
+from datetime import tzinfo
 from pathlib import Path
 from xml.etree import ElementTree
 from zoneinfo import ZoneInfo
 
+import cv2
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from services.__main__ import app
 from services.errors import ConfigError
 from services.history import command
-from services.history.plot import Curve, svg
+from services.history.plot import GRID, HEIGHT, INK, LINE, WIDTH, Curve, draw
+from services.history.svg import Svg
 from services.payloads import seconds
 from services.storage import Batch, Item, Mission, Sample, open_storage
 
@@ -114,8 +118,24 @@ def test_a_plot_is_a_picture_with_a_time_axis_and_the_unit(
     assert texts[0] == "Lab, °C"
     assert len([text for text in texts if re.fullmatch(r"\d\d:\d\d|\d{4}-\d\d-\d\d", text)]) >= 3
     assert (picture.find(f"{tag}polygon") is not None) is (kind == "band")
-    (line,) = picture.iter(f"{tag}polyline")
-    assert len(line.attrib["points"].split()) > 100
+    assert max(len(line.attrib["points"].split()) for line in picture.iter(f"{tag}polyline")) > 100
+
+
+def test_a_plot_may_be_a_png_which_shows_the_same_and_nothing_else(site: Path, tmp_path: Path) -> None:
+    run(site, "Lab", "--since", "2d", "--plot", str(tmp_path / "lab.png"))
+    pixels = cv2.imread(str(tmp_path / "lab.png"))
+    assert pixels is not None
+    assert pixels.shape[1] / pixels.shape[0] == WIDTH / HEIGHT
+    colours = {tuple(reversed(colour)) for colour in np.unique(pixels.reshape(-1, 3), axis=0).tolist()}
+    assert {(255, 255, 255), INK, GRID, LINE} <= colours
+    refused = CliRunner().invoke(app, ["history", "Lab", "--plot", "lab.pdf", "--config", str(site)]).exception
+    assert isinstance(refused, ConfigError)
+
+
+def svg(curve: Curve, zone: tzinfo) -> str:
+    sheet = Svg(WIDTH, HEIGHT)
+    draw(sheet, curve, zone)
+    return sheet.file().decode()
 
 
 def test_ticks_are_round_on_the_homes_clock_and_values_within_the_frame() -> None:
@@ -132,7 +152,7 @@ def test_ticks_are_round_on_the_homes_clock_and_values_within_the_frame() -> Non
 
 def test_a_flat_line_and_a_single_value_can_be_drawn() -> None:
     for points in ([(0, 5.0)], [(0, 0.0), (10, 0.0)], [(0, -1e9), (10, 1e9)]):
-        assert "polyline" in svg(Curve("x", "W", points, 0, 60_000_000), MADRID)
+        assert 'stroke="#1f5f8b"' in svg(Curve("x", "W", points, 0, 60_000_000), MADRID)
 
 
 @pytest.mark.parametrize(

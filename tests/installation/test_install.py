@@ -115,6 +115,18 @@ def test_installing_again_keeps_what_people_changed(machine: Path) -> None:
     assert len(units(machine)) == 8
 
 
+def test_a_service_that_the_configuration_has_no_more_loses_its_unit(tmp_path: Path) -> None:
+    assert install("--systemd", "--root", str(tmp_path)).returncode == 0
+    config = tmp_path / "etc/apartment/apartment.yaml"
+    config.write_text(re.sub(r"^bridge:\n(?:  .*\n)*", "", config.read_text(), flags=re.M))
+    assert (tmp_path / "etc/systemd/system/apartment-bridge.service").exists()
+    done = install("--systemd", "--root", str(tmp_path))
+    assert "run    systemctl stop apartment-bridge.service" in done.stdout
+    assert "remove /etc/systemd/system/apartment-bridge.service" in done.stdout
+    assert not (tmp_path / "etc/systemd/system/apartment-bridge.service").exists()
+    assert "bridge" not in (tmp_path / "etc/systemd/system/apartment.target").read_text()
+
+
 def test_a_dry_run_shows_the_steps_and_does_nothing(tmp_path: Path) -> None:
     done = install("--dry-run", "--root", str(tmp_path))
     assert done.returncode == 0, done.stderr

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import socket
+import struct
 import urllib.error
+import urllib.parse
 import urllib.request
 from collections.abc import Iterable
 
@@ -80,3 +83,16 @@ def test_rubbish_is_a_bad_message() -> None:
     for topic, payload in (("service/a/info", b"[" * 10_000), ("diagnostics/a", json.dumps({"level": 9}).encode())):
         with pytest.raises(BadMessage):
             Known().handle(Message(topic, payload, received=T), T)
+
+
+def test_who_goes_away_before_the_answer_leaves_no_trace_in_the_log(capfd: pytest.CaptureFixture[str]) -> None:
+    """With a reset, in the middle of what it asks; the page answers the next one."""
+    with start(Config(port=0), lambda message: None) as service:
+        address = urllib.parse.urlsplit(service.addresses["metrics"])
+        for _ in range(20):
+            with socket.create_connection(("127.0.0.1", address.port or 0)) as link:
+                link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                link.sendall(b"GET /" + b"x" * 100_000 + b" HTTP/1.1\r\n\r\n")
+        list(service.tick(T))
+        assert page(service.addresses["metrics"]) == {("apartment_metrics_forgotten",): 0.0}
+    assert "Traceback" not in capfd.readouterr().err

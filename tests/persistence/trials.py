@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +27,7 @@ from services.storage import open_storage, read_address
 from tests.network import Network, network
 
 ITEMS = 100
+NAMES = [f"I{number}" for number in range(ITEMS)]
 RATE = 2000  # messages a second
 BURST = 20
 DRAINED_S = 120.0
@@ -39,8 +40,8 @@ class Publisher:
     What was not acknowledged when the connection broke is not said again: nobody was promised anything.
     """
 
-    def __init__(self, port: int) -> None:
-        self._port = port
+    def __init__(self, port: int, items: Sequence[str] = NAMES, rate: float = RATE, burst: int = BURST) -> None:
+        self._port, self._items, self._rate, self._burst = port, items, rate, burst
         self.acknowledged: set[int] = set()
         self.said = 0
         self._stop = threading.Event()
@@ -77,8 +78,8 @@ class Publisher:
         due = time.monotonic()
         while not self._stop.is_set() or waiting:
             if not self._stop.is_set() and time.monotonic() >= due and len(waiting) < 2000:
-                due += BURST / RATE
-                link.sendall(b"".join(self._packet(waiting) for _ in range(BURST)))
+                due += self._burst / self._rate
+                link.sendall(b"".join(self._packet(waiting) for _ in range(self._burst)))
             pause = 0.5 if self._stop.is_set() else max(0.0, due - time.monotonic())
             if select.select([link], [], [], pause)[0]:
                 came = link.recv(65536)
@@ -90,7 +91,7 @@ class Publisher:
         number, self.said = self.said, self.said + 1
         packet = number % 65535 + 1
         waiting[packet] = number
-        topic = f"home/I{number % ITEMS}/state".encode()
+        topic = f"home/{self._items[number % len(self._items)]}/state".encode()
         body = len(topic).to_bytes(2, "big") + topic + packet.to_bytes(2, "big") + str(number).encode()
         return b"\x32" + bytes([len(body)]) + body
 

@@ -35,6 +35,7 @@ from services.vision.calibrate_mount import FEWEST
 from services.vision.frames import Mount
 from services.vision.lens import ASPECT_TOLERANCE, Lens
 from services.vision.mount_squares import Known
+from services.whole_file import write_whole
 
 SETTLE_S = 0.6  # from rest to a picture that shows it, where the configuration does not say
 
@@ -194,7 +195,7 @@ class Calibrator:
         file = self.config.state / "cameras" / f"{self.config.name}-{what}.html"
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
-            files.replaced(file, page.encode())
+            write_whole(file, page)
         except OSError as error:
             log.warning("the report is not kept: %s", error)
             return None

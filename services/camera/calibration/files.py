@@ -5,7 +5,6 @@ Not here: the mount's section in the configuration, that is `section.py`.
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 from services import document
 from services.camera.requests import Refused
 from services.vision.lens import COEFFICIENTS, Lens
+from services.whole_file import write_whole
 
 
 def camera_info(lens: Lens, name: str) -> dict[str, Any]:
@@ -52,21 +52,5 @@ def kept(file: Path, now: float) -> Path | None:
     if not file.exists():
         return None
     copy = file.with_name(f"{file.name}.{time.strftime('%Y%m%d-%H%M%S', time.gmtime(now))}.bak")
-    replaced(copy, file.read_bytes(), like=file)
+    write_whole(copy, file.read_bytes(), like=file)
     return copy
-
-
-def replaced(file: Path, content: bytes, *, like: Path | None = None) -> None:
-    """Writes a file; whoever reads meanwhile sees the old one or the new one, never a part.
-
-    Who may read it stays as it was, or is as `like` says: a configuration may hold passwords.
-    """
-    real, model = file.resolve(), like or file
-    beside = real.with_name(f".{real.name}.{os.getpid()}")
-    mode = model.stat().st_mode & 0o777 if model.exists() else 0o644
-    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as output:
-        os.fchmod(output.fileno(), mode)
-        output.write(content)
-        output.flush()
-        os.fsync(output.fileno())
-    beside.replace(real)

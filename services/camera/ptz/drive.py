@@ -9,21 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import atan, degrees, radians, sqrt, tan
+from math import sqrt
 from typing import Literal
 
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told
 from services.camera.ptz.skill import Skill
-from services.camera.requests import GotoPreset, MoveOver, MoveTo, Reply
+from services.camera.requests import GotoPreset, MoveTo, Reply
 
 ABSOLUTE: tuple[Literal["PositionABS", "moveAbsolutely"], ...] = ("PositionABS", "moveAbsolutely")
 PRESET_DEG = 2.0  # a preset as near to the goal as that is worth going to
 PRESET_LEVELS = 0.5
 BESIDE_DEG = 6.0  # farther from what was asked for, it was not honoured
-PLANE_DEG = 12.0  # the picture's plane is flat enough for so much
-PLANE_TAN = (1.0, 0.56)  # of the whole scale at the widest zoom, a guess to begin with
 LEAST_DEG = 0.3
 ZOOM_LATE_S = 0.04  # it may still slow down when its coarse reading is the last one
 NOISE_DEG, NOISE_S = 0.2, 0.03  # of a reading on the way
@@ -34,7 +32,7 @@ WITHIN_DEG = 0.1  # what is asked for stays so far from an end stop
 class Drive:
     """One such move: what to send, and where that should lead."""
 
-    request: MoveTo | MoveOver | GotoPreset
+    request: MoveTo | GotoPreset
     to: Pose
 
 
@@ -47,7 +45,7 @@ def find(
     """
     exact = any(skill.honours.get(form) == "yes" for form in ABSOLUTE)
     near = None if exact else _preset(pose, aim, limits, {**presets, **skill.presets})
-    return near or _absolute(aim, limits, skill) or _over(pose, aim, skill)
+    return near or _absolute(aim, limits, skill)
 
 
 def _absolute(aim: Pose, limits: Limits, skill: Skill) -> Drive | None:
@@ -71,34 +69,6 @@ def _preset(pose: Pose, aim: Pose, limits: Limits, presets: Mapping[int, tuple[f
         if off <= PRESET_DEG and far > 2 * PRESET_DEG and abs(there[ZOOM] - aim[ZOOM]) <= PRESET_LEVELS:
             return Drive(GotoPreset(number), there)
     return None
-
-
-def _over(pose: Pose, aim: Pose, skill: Skill) -> Drive | None:
-    """On by a part of the scale: for what is near, and in the right zoom."""
-    way = [aim[axis] - pose[axis] for axis in (PAN, TILT)]
-    senses = skill.senses[:2]
-    if abs(aim[ZOOM] - pose[ZOOM]) > 1.0 or max(map(abs, way)) > PLANE_DEG:
-        return None
-    if skill.honours.get("Position", "unknown") not in ("unknown", "yes") or not all(one.sure for one in senses):
-        return None
-    planes = plane(pose[ZOOM], skill)
-    parts = [one.sign * tan(radians(off)) / whole for one, off, whole in zip(senses, way, planes, strict=True)]
-    right, down = (max(-1.0, min(1.0, part)) for part in parts)
-    return Drive(MoveOver(right, down), aim)
-
-
-def plane(zoom: float, skill: Skill) -> tuple[float, float]:
-    """The tangents of the whole scale at a zoom: what was seen there, or a guess from what was seen elsewhere."""
-    if zoom in skill.planes or not skill.planes:
-        return skill.planes.get(zoom, (PLANE_TAN[0] / larger(zoom), PLANE_TAN[1] / larger(zoom)))
-    known = min(skill.planes, key=lambda other: abs(other - zoom))
-    pan, tilt = skill.planes[known]
-    return pan * larger(known) / larger(zoom), tilt * larger(known) / larger(zoom)
-
-
-def larger(zoom: float) -> float:
-    """How much the picture grows with zoom, about."""
-    return 1.0 + zoom / 4.0
 
 
 def seconds(pace: Pace, distance: float) -> float:
@@ -137,8 +107,6 @@ def judge(skill: Skill, here: Pose, drive: Drive, there: Pose) -> None:
             skill.presets[number] = (there[PAN] % 360.0, there[TILT], there[ZOOM])
         case MoveTo():
             _judge_to(skill, here, drive, drive.request, there)
-        case MoveOver():
-            _judge_over(skill, here, drive.request, there)
 
 
 def _judge_to(skill: Skill, here: Pose, drive: Drive, request: MoveTo, there: Pose) -> None:
@@ -155,24 +123,9 @@ def _judge_to(skill: Skill, here: Pose, drive: Drive, request: MoveTo, there: Po
         skill.beside[request.form] = (before[PAN] + off[PAN], before[TILT] + off[TILT])
 
 
-def _judge_over(skill: Skill, here: Pose, request: MoveOver, there: Pose) -> None:
-    moved = [there[axis] - here[axis] for axis in (PAN, TILT)]
-    parts = (request.right, request.down)
-    asked = max(degrees(atan(abs(part))) for part in parts)
-    if asked > 1.0 and max(map(abs, moved)) < LEAST_DEG:
-        skill.honours[request.form] = "no"
-        return
-    skill.honours[request.form] = "yes"
-    old = list(plane(here[ZOOM], skill))
-    for axis, part in enumerate(parts):
-        if abs(moved[axis]) > 1.0 and moved[axis] * part * skill.senses[axis].sign > 0:
-            old[axis] = abs(tan(radians(moved[axis])) / part)
-    skill.planes[here[ZOOM]] = (old[PAN], old[TILT])
-
-
 def refuse(skill: Skill, drive: Drive) -> None:
     """The firmware said no; a preset may be there another time."""
-    if isinstance(drive.request, MoveTo | MoveOver):
+    if isinstance(drive.request, MoveTo):
         skill.honours[drive.request.form] = "no"
 
 

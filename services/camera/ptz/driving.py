@@ -51,7 +51,7 @@ class Driving:
 
     def _late(self) -> bool:
         """Whether there is no time to try something new: one in a move, and while there are commands left."""
-        return self.drives > 0 or self.helm.left < TRY_LEFT
+        return self.drives > 1 or self.helm.left < TRY_LEFT
 
     def _arrive(self, way: own.Drive, here: Pose, begun: Reply) -> Plan[tuple[Reading, float]]:
         """Looks at the firmware's own move until it has ended; once on the way, where its speed is not known well."""
@@ -64,27 +64,35 @@ class Driving:
             now, seen = reply.received, self.helm.limits.pose(cast(Reading, reply.result))
             own.learn_on_the_way(self.helm.skill, here, way, begun, reply, seen)
             arrives = begun.received + own.longest(self.helm.skill, here, way.to)
-        timing = self.helm.skill.paces[PAN]
-        look_at = arrives - timing.other(READ_LATE) + self.helm.skill.arrives_late
-        now = yield from wait(max(now, look_at))
-        before: Reading | None = None
-        for look in range(LOOKS):
-            reply = yield from self.helm.send(Status())
-            reading = cast(Reading, reply.result)
-            if look == 0 and own.certain(self.helm.skill, way):
-                self.helm.skill.expect_arrival(there=self._there(reading, way))
-            if self._there(reading, way) or (before is not None and same(before, reading)):
-                break
-            before = reading
+        certain = own.certain(self.helm.skill, way)
+        reading, now = yield from at_rest(self.helm, arrives, way.to, now, certain=certain)
         there = self.helm.limits.pose(reading)
         own.judge(self.helm.skill, here, way, there)
         self.helm.skill.zoomed = (reading.zoom, way.to[ZOOM]) if abs(reading.zoom - way.to[ZOOM]) <= 1.0 else None
         self.helm.stand(reading)
-        return reading, reply.received
+        return reading, now
 
-    def _there(self, reading: Reading, way: own.Drive) -> bool:
-        """Whether it is where the firmware was to drive, as far as that is known exactly."""
-        if not own.certain(self.helm.skill, way):
-            return False
-        pose = self.helm.limits.pose(reading)
-        return all(abs(pose[axis] - way.to[axis]) <= NEARER_DEG for axis in (PAN, TILT))
+
+def at_rest(
+    helm: Helm, arrives: float, to: Pose, now: float, *, certain: bool, about: float = 0.0
+) -> Plan[tuple[Reading, float]]:
+    """Looks until what the firmware drives has ended; `certain`: it is known exactly where that leads.
+
+    `about`: that is not known quite exactly, but so few degrees; there one look is enough if it tells of rest.
+    """
+    skill = helm.skill
+    yield from wait(max(now, arrives - skill.paces[PAN].other(READ_LATE) + skill.arrives_late))
+    seen: list[Reading] = []
+    for _ in range(LOOKS):
+        reply = yield from helm.send(Status())
+        seen.append(cast(Reading, reply.result))
+        pose = helm.limits.pose(seen[-1])
+        off = max(abs(pose[axis] - to[axis]) for axis in (PAN, TILT))
+        rests = helm.tells_rest(seen[-1])
+        there = certain and off <= NEARER_DEG and (rests or not about)
+        on = helm.beside(pose) and off <= about and rests
+        if there or on or (len(seen) > 1 and same(seen[-2], seen[-1])):
+            break
+    if certain and (there or not same(seen[0], seen[-1])):
+        skill.expect_arrival(there=len(seen) == 1)
+    return seen[-1], reply.received

@@ -14,12 +14,11 @@ from services.camera.ptz.stand import stop as until_confirmed
 from services.camera.requests import Direction, Reading, Reply, Request, Start, Status
 
 NEAR_LEVELS = 0.5
-EDGES: Pose = (EDGE_DEG, EDGE_DEG, 0.3)  # how far from the ends of its range each axis stays
-COARSE_EDGE = 0.25  # of a step of zoom's reading, where that is coarse
+END_LEVELS = 0.3  # zoom ends so far from the ends of its range
 ODD_DEG = 0.4  # a reading farther from what was reckoned may not be of a camera at rest
 LATE_DOUBT_S = 0.15  # the age of readings is not known well: two equal ones, then
 LONGEST_DOUBT_S = 0.35
-EARLY = 0.4  # of what zoom has before it, at most, is given up for not knowing its rate
+UNSURE_LEVELS = 0.1  # it is not said to stand at the very end, which it may just have missed
 FOREVER = 1e12
 WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
 SURPRISES = 0.2  # of what was known before is replaced by each rest
@@ -33,9 +32,9 @@ class Helm:
 
     def __init__(self, goal: Goal, limits: Limits, skill: Skill) -> None:
         self.goal, self.limits, self.skill = goal, limits, skill
-        ends = zip(goal.pose, limits.ranges, EDGES, strict=True)
-        pan, tilt, zoom = (min(high - edge, max(low + edge, value)) for value, (low, high), edge in ends)
-        self.aim: Pose = (pan, tilt, zoom)
+        ends = zip(goal.pose[:ZOOM], limits.ranges, strict=False)
+        pan, tilt = (min(high - EDGE_DEG, max(low + EDGE_DEG, value)) for value, (low, high) in ends)
+        self.aim: Pose = (pan, tilt, goal.pose[ZOOM])
         self.commands = 0
         self.zoom_ends: float | None = None
         self.quiet = 0.0  # until then the firmware drives by itself
@@ -51,6 +50,10 @@ class Helm:
         pan, tilt, zoom = self.limits.pose(reading)
         return pan, tilt, self.skill.zoom_truth(zoom)
 
+    def beside(self, pose: Pose) -> bool:
+        """Whether this is not the goal yet."""
+        return any(abs(self.goal.pose[axis] - pose[axis]) > self.skill.near for axis in (PAN, TILT))
+
     def stand(self, reading: Reading) -> None:
         """It was read at rest."""
         self.skill.see_zoom(reading.zoom, self.limits.zoom)
@@ -61,6 +64,8 @@ class Helm:
         self.commands += 1
         reply = yield from ask(request)
         self.skill.timing.learn(reply.received - reply.sent)
+        if isinstance(reply.result, Reading) and reply.result.moving:
+            self.skill.says_moving = True
         return reply
 
     def start(self, levels: Levels) -> Plan[Reply]:
@@ -148,6 +153,10 @@ class Helm:
         """Whether the camera says that it moves; some firmware says so for ever."""
         return reading.moving is True and not self.skill.always_moving
 
+    def tells_rest(self, reading: Reading) -> bool:
+        """Whether a reading tells by itself that the camera rests: its word was seen to change."""
+        return reading.moving is False and self.skill.says_moving and not self.skill.always_moving
+
     def _settled(self) -> float:
         """When a reading has to be asked for that shows everything at rest."""
         pace = self.skill.paces[PAN]
@@ -155,10 +164,12 @@ class Helm:
         return max(self.quiet, self.course.rests_at()) - pace.other(READ_LATE) + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:
-        """Where zoom truly stands: what was reckoned, as far as its reading allows."""
+        """Where zoom truly stands: what was reckoned, as far as its reading and its range allow."""
         if self.zoom_ends is None:
             half = max(0.1, self.skill.zoom_grid / 2)
-            off = self.course.stopped(ZOOM, FOREVER) - reading.zoom
+            low, high = self.limits.zoom
+            reckoned = self.course.stopped(ZOOM, FOREVER)
+            off = min(high - UNSURE_LEVELS, max(low + UNSURE_LEVELS, reckoned)) - reading.zoom
             self.skill.zoomed = (reading.zoom, reading.zoom + (off if abs(off) <= half else sign(off) * half / 2))
 
     def least(self, axis: int) -> float:
@@ -168,27 +179,16 @@ class Helm:
     def zoom_aim(self) -> float:
         """Where zoom should end: a late end does no harm there, and its coarse reading is the goal's."""
         low, high = self.limits.zoom
-        edge = self.zoom_edge()
-        return min(high - edge, max(low + edge, self.goal.pose[ZOOM]))
+        return min(high - END_LEVELS, max(low + END_LEVELS, self.goal.pose[ZOOM]))
 
     @property
     def zoom_near(self) -> float:
         """As near as that zoom has arrived: its coarse reading is the goal's then."""
         return max(NEAR_LEVELS, self.skill.zoom_grid / 2)
 
-    def zoom_edge(self) -> float:
-        """How far from an end of its range zoom stays."""
-        return max(EDGES[ZOOM], COARSE_EDGE * self.skill.zoom_grid)
-
     def time_zoom(self, now: float) -> None:
-        """When zoom has to be ended: by what is known of its rate, earlier near an end while that is little."""
-        level, pace = self.course.levels[ZOOM], self.skill.paces[ZOOM]
-        low, high = self.limits.zoom
-        aim = self.zoom_aim()
-        ends = self.course.end_for(ZOOM, aim, now)
-        room = high - aim if level > 0 else aim - low
-        early = min(max(0.0, self.course.doubt(ZOOM, ends) - room) / pace.rate(1), EARLY * (ends - now))
-        self.zoom_ends = max(now, ends - early - self.skill.timing.usual)
+        """When zoom has to be ended, by what is known of its rate."""
+        self.zoom_ends = max(now, self.course.end_for(ZOOM, self.zoom_aim(), now) - self.skill.timing.usual)
 
 
 def levels_of(turning: dict[int, int]) -> Levels:

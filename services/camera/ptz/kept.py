@@ -6,7 +6,6 @@ Another camera under the same name, or another firmware, begins anew. A file tha
 from __future__ import annotations
 
 import logging
-import os
 from collections import deque
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from services.camera.ptz.pace import Pace
 from services.camera.ptz.skill import KEEP, Honours, Sense, Skill
 from services.camera.requests import Identity
+from services.whole_file import write_whole
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
@@ -75,10 +75,7 @@ class Kept:
             return
         text = _kept(self.identity, skill).model_dump_json()
         try:
-            self.file.parent.mkdir(parents=True, exist_ok=True)
-            fresh = self.file.with_suffix(".new")
-            fresh.write_text(text, encoding="utf-8")
-            os.replace(fresh, self.file)
+            write_whole(self.file, text)
         except OSError as error:
             log.warning("what was learnt of the motors is not kept: %s", error)
 

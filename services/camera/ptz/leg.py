@@ -112,7 +112,7 @@ def _judged(leg: Leg, outlook: Outlook, left: int, runs: dict[int, int]) -> Leg:
         way = ways[axis]
         spread = spread_of(way.pace, part.speed, part.held, skill)
         beyond = part.off + way.pace.rate(part.speed) * skill.timing.tail - way.room
-        if beyond > CRAWL_DEG:
+        if beyond > (CRAWL_DEG if part.speed == 1 else 0.0):
             return replace(leg, cost=DANGER + beyond)  # a late end may push against a stop
         chances.append(chance(part.off, spread, skill.near))
         if chances[-1] < 1.0:

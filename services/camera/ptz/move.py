@@ -17,6 +17,7 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.driving import Driving
 from services.camera.ptz.goal import Goal, Limits, Pose
 from services.camera.ptz.helm import Helm
+from services.camera.ptz.hopping import Hopping
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.turning import Turning
@@ -64,6 +65,7 @@ class Move:
         self.zooming = Zooming(self.helm)
         self.turning = Turning(self.helm, self.zooming)
         self.driving = Driving(self.helm, presets)
+        self.hopping = Hopping(self.helm)
         self.stuck = 0
 
     def plan(self, near: Reading | None) -> Plan[Arrival]:
@@ -77,6 +79,8 @@ class Move:
                 raise DeviceError(self._failed(reading, "in time" if now > self.until else "the camera does not turn"))
             before = self.helm.limits.pose(reading)
             driven = yield from self.driving.drive(reading, now)
+            if driven is None and self.helm.zoom_ends is None:
+                driven = yield from self.hopping.hop(now)
             if driven is not None:
                 reading, now = driven
                 self._notice(before, self.helm.limits.pose(reading), out)

@@ -79,6 +79,7 @@ class Skill:
     diagonals: bool = True
     steady: int = 0  # readings of an axis at rest that were alike; -1: two were not, they dither
     always_moving: bool = False  # it says that it moves while it rests
+    says_moving: bool = False  # it was seen to say so at all
     zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
     drives: tuple[Pace, Pace, Pace] = field(default_factory=lambda: tuple(Pace((top,)) for top in DRIVES))  # type: ignore[assignment]

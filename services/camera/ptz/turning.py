@@ -156,6 +156,13 @@ class Turning:
         stop = high - before if self.helm.course.levels[axis] > 0 else low + before
         return self.helm.course.end_for(axis, stop, now)
 
+    def _along(self, left: dict[int, int]) -> list[int]:
+        """The axes that turn without being led to an end."""
+        return [axis for axis in (PAN, TILT) if self.helm.course.levels[axis] and axis not in left]
+
+    def _rate(self, axis: int) -> float:
+        return self.helm.skill.paces[axis].rate(abs(self.helm.course.levels[axis]))
+
     def _watch(self, leg: Leg, left: dict[int, int], now: float) -> Plan[float]:
         """Waits until the next end has to be sent; reads on the way where that makes the end more certain."""
         usual, spread = self.helm.skill.timing.usual, self.helm.skill.timing.spread
@@ -167,6 +174,7 @@ class Turning:
                 send = min([together, *(max(ends[axis], self._safe(axis, rates[axis], now)) for axis in left)]) - usual
             else:
                 send = min(ends.values()) - usual
+            send = min([send, *(self._safe(axis, self._rate(axis), now) - usual for axis in self._along(left))])
             if look == LOOKS or send - now < usual + spread:
                 break
             enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else self.helm.skill.near

@@ -22,7 +22,7 @@ from services.camera.video.settings import LATENCIES_S
 
 SAME_SHAPE = 0.01  # of the aspect; the lens refuses more
 FINE = 95  # quality: the frame has been through one encoder already
-WAITING = 24  # pictures that nobody took out yet; more are lost
+WAITING = 24  # pictures that nobody took out yet; what comes then is not looked at
 STALE_S = 4.0  # without a picture for so long, the stream stands still; a busy machine pauses for two or three
 
 log = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ class Live:
         self.footage = Footage()
         self.unfit = False
         self._newest: Newest | None = None
-        self._came: deque[Glimpse] = deque(maxlen=WAITING)
+        self._came: deque[Glimpse] = deque()
         self._done: deque[tuple[Visit, float, bytes]] = deque()
         self._before: Thumb | None = None
         self._arrived = 0.0
@@ -98,7 +98,10 @@ class Live:
         return newest
 
     def _see(self, frame: Frame) -> None:
-        """On the thread that reads: one more picture."""
+        """On the thread that reads: one more picture, compared with the last one that was looked at."""
+        if len(self._came) >= WAITING:
+            self._arrived = frame.arrived
+            return
         try:
             image = frame.develop()
         except Away:

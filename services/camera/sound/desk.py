@@ -20,6 +20,7 @@ from services.camera.requests import Refused, Reply, Request
 from services.camera.sound import g711, wav
 from services.errors import DeviceError
 from services.runner import Post
+from services.whole_file import write_whole
 
 END_S = 1.5
 LARGEST = 200_000_000  # bytes of a file to be played
@@ -105,11 +106,8 @@ class Desk:
 
 def keep(file: Path, samples: g711.Samples) -> Recorded:
     """Writes a WAV file, whole or not at all."""
-    file.parent.mkdir(parents=True, exist_ok=True)
     data = wav.write(samples)
-    part = file.with_name(f".{file.name}.part")
-    part.write_bytes(data)
-    part.replace(file)
+    write_whole(file, data)
     return Recorded(len(samples) / g711.RATE, len(data))
 
 

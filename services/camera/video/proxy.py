@@ -16,27 +16,24 @@ import select
 import socket
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from ipaddress import ip_address
-from socketserver import TCPServer
-from threading import BoundedSemaphore, Thread
+from threading import BoundedSemaphore
 from time import monotonic
 from typing import Any
 from urllib.parse import urlsplit
 
 from services.camera.video.newest import Newest
 from services.camera.video.settings import Network, StreamSettings
+from services.http_doors import Doors, Visitor
 
 BOUNDARY = "picture"
-STALLED_S = 10.0  # a viewer that takes nothing for so long is gone
 QUIET_S = 2.0  # between two looks whether a viewer is still there, while no picture comes
 SNAPSHOT_S = 22.0  # the camera may take 20 s
 FRESH_S = 2.0  # a picture as old as this is still the newest one
 STRANGERS = 4  # connections at once from addresses that may not look: they are told so, and keep nobody out
 SEND_BUFFER = 256 * 1024  # bytes; with more a slow viewer sees what was long ago
-POLL_S = 0.5  # how long the port may take to notice that it is to close
+UNSEATED = 4  # connections that one address may have besides the seats: half of the doors
 STRICT = (
     ("Cache-Control", "no-store, no-cache, must-revalidate, max-age=0"),
     ("Pragma", "no-cache"),
@@ -48,37 +45,29 @@ STRICT = (
 log = logging.getLogger(__name__)
 
 
-class Proxy(ThreadingHTTPServer):
+class Proxy(Doors):
     """The port. `on()`: whether the stream is switched on; `ask()` asks for a snapshot, which will come into the
     slot; False when there is nobody to ask.
 
     OSError when it cannot listen there.
     """
 
-    daemon_threads = False  # they end by themselves: see close
-    request_queue_size = 32
-
     def __init__(
         self, camera: str, settings: StreamSettings, newest: Newest, on: Callable[[], bool], ask: Callable[[], bool]
     ) -> None:
-        self.address_family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
-        super().__init__((settings.host, settings.port), Viewer)
+        super().__init__(settings.host, settings.port, Viewer, settings.viewers + UNSEATED)
         self.settings, self.newest, self.on, self.ask = settings, newest, on, ask
         self.stream_path = f"/camera/{camera}/stream.mjpg"
         self.snapshot_path = f"/camera/{camera}/snapshot.jpg"
         self.names = _own_names(settings)
         self.seats = BoundedSemaphore(settings.viewers)
-        self.doors = BoundedSemaphore(2 * settings.viewers + 8)  # connections that have not said what they want, too
+        self.doors = BoundedSemaphore(
+            2 * (settings.viewers + UNSEATED)
+        )  # connections that have not said what they want, too
         self.porch = BoundedSemaphore(STRANGERS)
-        self._open: dict[socket.socket, BoundedSemaphore] = {}
+        self._entrances: dict[socket.socket, BoundedSemaphore] = {}
         self.closing = False
-        self._thread = Thread(target=self.serve_forever, args=(POLL_S,), name="camera proxy", daemon=True)
-        self._thread.start()
-
-    def server_bind(self) -> None:
-        """Binds; asks no name server for its own name."""
-        TCPServer.server_bind(self)
-        self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
+        self.begin()
 
     def may_look(self, address: str) -> bool:
         """Whether somebody there may look."""
@@ -103,7 +92,10 @@ class Proxy(ThreadingHTTPServer):
         entrance = self.doors if self.may_look(str(client_address[0])) else self.porch
         if not entrance.acquire(blocking=False):
             return False
-        self._open[request] = entrance
+        if not super().verify_request(request, client_address):
+            entrance.release()
+            return False
+        self._entrances[request] = entrance
         return True
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
@@ -111,7 +103,7 @@ class Proxy(ThreadingHTTPServer):
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self._open.pop(request).release()
+            self._entrances.pop(request).release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A viewer that went away is none of our concern; anything else is a bug, and told."""
@@ -122,28 +114,22 @@ class Proxy(ThreadingHTTPServer):
         """Ends the port and every viewer."""
         self.closing = True
         self.newest.close()
-        self.shutdown()
-        self._thread.join()
-        for connection in list(self._open):
-            with suppress(OSError):  # it was about to end by itself
-                connection.shutdown(socket.SHUT_RDWR)
-        self.server_close()
+        super().close()
 
 
-class Viewer(BaseHTTPRequestHandler):
+class Viewer(Visitor):
     """One connection of one who looks."""
 
     server: Proxy
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "apartment", ""
-    timeout = STALLED_S
 
     def setup(self) -> None:
         """A small buffer: pictures wait here, not in the network."""
         self.request.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         super().setup()
 
-    def do_GET(self) -> None:
+    def do_GET(self) -> None:  # noqa: N802  # the standard library's name
         """Looks."""
         self.close_connection = True
         path = self.path.partition("?")[0]
@@ -159,7 +145,7 @@ class Viewer(BaseHTTPRequestHandler):
             finally:
                 self.server.seats.release()
 
-    def do_HEAD(self) -> None:
+    def do_HEAD(self) -> None:  # noqa: N802  # the same
         """The same without pictures."""
         self.do_GET()
 

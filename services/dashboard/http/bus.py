@@ -11,7 +11,7 @@ from pydantic import Field
 from services import topics
 from services.bus import Message
 from services.dashboard.house import House
-from services.dashboard.http.endpoint import Asked, Body, Done, Endpoint
+from services.dashboard.http.endpoint import Asked, Body, Done, Endpoint, one_of
 from services.errors import BadMessage
 from services.payloads import Order, Position, PositionSet
 from services.robot_payloads import MissionOrder, Where
@@ -152,16 +152,10 @@ class Desk:
         return item
 
     def _camera(self, asked: Asked) -> str:
-        return _one_of(self.house.config.cameras, asked.path("camera"), "camera")
+        return one_of(self.house.config.cameras, asked.path("camera"), "camera")
 
     def _robot(self, asked: Asked) -> str:
-        return _one_of(tuple(self.house.config.robots), asked.path("robot"), "robot")
-
-
-def _one_of(known: tuple[str, ...], name: str, what: str) -> str:
-    if name not in known:
-        raise BadMessage(f"{what}: expected one of {', '.join(known) or 'none'}, got {name[:80]!r}")
-    return name
+        return one_of(tuple(self.house.config.robots), asked.path("robot"), "robot")
 
 
 def _id() -> str:

@@ -108,6 +108,13 @@ def fault(status: int, why: str, headers: dict[str, str] | None = None) -> Respo
     return JSONResponse({"error": why}, status, headers)
 
 
+def one_of(known: tuple[str, ...], name: str, what: str) -> str:
+    """That name; BadMessage when it is none of those that we have."""
+    if name not in known:
+        raise BadMessage(f"{what}: expected one of {', '.join(known) or 'none'}, got {name[:80]!r}")
+    return name
+
+
 def _refused(who: Who, session: Session | None) -> Response | None:
     if who == "anybody":
         return None

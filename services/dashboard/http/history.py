@@ -11,11 +11,14 @@ from starlette.responses import Response
 from services.dashboard.house import House
 from services.dashboard.http.endpoint import Asked, Endpoint
 from services.errors import BadMessage
-from services.payloads import HistoryReply, seconds, stamp
+from services.history_payloads import HistoryReply
+from services.payloads import seconds, stamp
+from services.robot_payloads import MissionResult
 from services.states import base_type
 
 POINTS = 800  # of a plot, when nobody says how many
 MOST_POINTS = 1500  # more do not fit into an answer of the bus
+PAST_MISSIONS = 40  # of all robots; each with its story
 NUMBERS = ("Number", "Dimmer", "Rollershutter")
 WIDTHS_S = (
     1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400,
@@ -35,6 +38,12 @@ class Series(BaseModel):
     rows: list[tuple[float, float, float, float]] | list[tuple[float, str | float]]
 
 
+class Missions(BaseModel):
+    """What `mission/<robot>/result` told of each."""
+
+    missions: list[MissionResult]
+
+
 def endpoints(house: House) -> list[Endpoint]:
     """The rows."""
 
@@ -51,6 +60,11 @@ def endpoints(house: House) -> list[Endpoint]:
         rows += [(seconds(when), value) for when, value in reply.samples]
         return Series(item=item, unit=None, every=None, since=since, until=until, rows=rows)
 
+    async def missions(asked: Asked) -> BaseModel:
+        robot = asked.path("robot")
+        reply = _good(await house.ask(what="missions", limit=PAST_MISSIONS))
+        return Missions(missions=[result for name, result in reply.missions or () if name == robot])
+
     async def table(asked: Asked) -> Response:
         series = await history(asked)
         assert isinstance(series, Series)
@@ -64,6 +78,8 @@ def endpoints(house: House) -> list[Endpoint]:
         Endpoint("GET", "/api/history/{item}.csv", "viewer", "What was of an item, as a table.", table,
                  answer="text/csv", query=span),
         Endpoint("GET", "/api/history/{item}", "viewer", "What was of an item.", history, answer=Series, query=span),
+        Endpoint("GET", "/api/missions/{robot}/past", "viewer", "The newest missions that have ended, oldest first.",
+                 missions, answer=Missions),
     ]  # fmt: skip
 
 

@@ -12,8 +12,9 @@ import uvicorn
 
 from services.dashboard.house import House
 from services.dashboard.http.application import application
+from services.dashboard.http.connection import Listening, Visit
 from services.dashboard.view import Entry
-from services.payloads import HistoryReply
+from services.history_payloads import HistoryReply
 
 log = logging.getLogger(__name__)
 START_S = 20.0
@@ -34,7 +35,7 @@ class Server:
         self._uvicorn = uvicorn.Server(
             uvicorn.Config(
                 application(house),
-                log_config=None, log_level="warning", access_log=False, lifespan="off", ws="none", http="h11",
+                log_config=None, log_level="warning", access_log=False, lifespan="off", ws="none", http=Visit,
                 server_header=False, proxy_headers=False, limit_concurrency=MOST_CONNECTIONS, loop="asyncio",
                 timeout_graceful_shutdown=1, timeout_keep_alive=20,
                 ssl_certfile=tls.cert if tls else None, ssl_keyfile=tls.key if tls else None,
@@ -56,6 +57,11 @@ class Server:
         """Hands over an answer of the history service; from any thread."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._house.answered, reply)
+
+    def pictured(self, camera: str, jpeg: bytes) -> None:
+        """Hands over an analysed picture of a scan; from any thread."""
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self._house.pictured, camera, jpeg)
 
     def close(self) -> None:
         """Ends every connection, and the thread."""
@@ -86,7 +92,7 @@ class Server:
 
 
 def _listening(host: str, port: int) -> socket.socket:
-    made = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    made = Listening(socket.AF_INET6 if ":" in host else socket.AF_INET)
     try:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if made.family == socket.AF_INET6:

@@ -13,12 +13,13 @@ import time
 from pathlib import Path
 
 from services import topics
-from services.dashboard.house import House
+from services.dashboard.house import SNAPSHOT, House
 from services.dashboard.http.video import Videos
 from services.dashboard.thumbnail import smaller
 from services.dashboard.view import Entry
 from services.errors import Unavailable
 from services.payloads import Position
+from services.whole_file import write_whole
 
 log = logging.getLogger(__name__)
 TOPIC = "/dashboard/thumbnails/"  # our own: the places of a camera that have one, and since when (ms)
@@ -65,11 +66,11 @@ class Thumbnails:
         return position.place if found is None or now - found[0] > AGAIN_S else None
 
     async def _take(self, camera: str, place: str) -> None:
-        stream = self.house.latest(topics.CAMERA_STREAM.name(cam=camera))
-        if stream is None:
+        url = self.house.picture_of(camera, SNAPSHOT)
+        if url is None:
             return
         try:
-            data = await self.videos.snapshot(json.loads(stream)["url"].rpartition("/")[0] + "/snapshot.jpg")
+            data = await self.videos.snapshot(url)
         except Unavailable as error:
             log.info("no picture of %s at %s: %s", camera, place, error)
             self._not_before[camera] = time.time() + AFTER_FAILURE_S
@@ -121,9 +122,6 @@ class Thumbnails:
         if file is None:
             return
         try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            beside = file.with_suffix(".new")
-            beside.write_bytes(small)
-            beside.replace(file)
+            write_whole(file, small)
         except OSError as error:
             log.warning("%s cannot be kept: %s", file, error)

@@ -78,6 +78,9 @@ export function icon(name) {
   return s("svg", { viewBox: "0 0 24 24", class: "icon", "aria-hidden": "true" }, s("path", { d: ICONS[name] ?? ICONS.other }));
 }
 
+/** Items' states as people say them. */
+export const WORDS = { ON: "On", OFF: "Off", OPEN: "Open", CLOSED: "Closed", PLAY: "Playing", PAUSE: "Paused", NULL: "–", UNDEF: "–" };
+
 /** How long ago, roughly. */
 export function ago(ms, now = Date.now()) {
   const seconds = Math.max(0, (now - ms) / 1000);

@@ -111,6 +111,12 @@ live.watch("camera/+/order_result", (entry) => {
   if (result.state === "failed" || result.state === "refused") toast(`${result.key}: ${result.error ?? result.state}`, "bad");
 });
 
+/** The hash names the view, so this link must not change it. */
+document.querySelector(".skip").addEventListener("click", (event) => {
+  event.preventDefault();
+  document.getElementById("main")?.focus();
+});
+
 theme(localStorage.getItem("theme") ?? "auto");
 const session = await api.get("/api/session").catch((error) => toast(error.message, "bad"));
 if (session) await (session.user === null ? login() : enter(session));

@@ -63,8 +63,10 @@ def move_to(request: MoveTo, channel: int) -> str:
 def move_over(request: MoveOver, channel: int) -> str:
     """Drives on by parts of the whole scale."""
     if request.form == "Position":
-        return ptz("start", "Position", channel, (round(request.right * PLANE), round(request.down * PLANE), 0))
-    return _plain("moveRelatively", channel, (round(request.right, 6), round(request.down, 6), 0))
+        over = (round(request.right * PLANE), round(request.down * PLANE), round(request.zoom, 2))
+        return ptz("start", "Position", channel, over)
+    zoom = round(request.zoom / ZOOM_LEVELS, 6)
+    return _plain("moveRelatively", channel, (round(request.right, 6), round(request.down, 6), zoom))
 
 
 def _plain(action: str, channel: int, arguments: tuple[float, ...]) -> str:

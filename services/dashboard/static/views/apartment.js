@@ -3,6 +3,7 @@
 import * as api from "../api.js";
 import { ago, badge, h, head, icon, s, text } from "../dom.js";
 import * as live from "../live.js";
+import { WORDS } from "./missions.js";
 
 export const topics = ["home/+/state", "camera/+/position", "camera/+/status", "camera/+/marker/+", "camera/+/scan/state", "robot/+/pose", "mission/+/state"];
 
@@ -238,16 +239,19 @@ function markers({ map, layers, side, stops }) {
       const [x, y] = map(one.position.x, one.position.y);
       const [a, b, turn] = ellipse(one.covariance);
       return s("g", { transform: `translate(${x} ${y})`, class: "marker", role: "img", "aria-label": `Marker ${one.marker}, ${one.place}`, "data-marker": one.marker },
-        s("title", {}, `Marker ${one.marker}: ${one.place}, ± ${(Math.max(a, b) / SIGMAS * 1000).toFixed(0)} mm`),
+        s("title", {}, `Marker ${one.marker}: seen from ${one.place}${one.covariance ? `, ± ${sure(one.covariance)} mm` : ""}`),
         s("ellipse", { rx: Math.max(0.04, a), ry: Math.max(0.04, b), transform: `rotate(${-turn})` }),
         s("rect", { x: -0.075, y: -0.075, width: 0.15, height: 0.15, rx: 0.02 }), s("text", { y: -0.14 }, `${one.marker}`));
     }));
-    side.markers.replaceChildren(...found.map((one) => h("li", {}, h("strong", {}, `${one.marker}`), h("span", {}, one.place, h("span", { class: "hint" }, ` ${ago(Date.parse(one.stamp))}`)))));
+    side.markers.replaceChildren(...found.map((one) => h("li", {}, h("strong", {}, `${one.marker}`), h("span", {}, `from ${one.place}`, h("span", { class: "hint" }, ` ${ago(Date.parse(one.stamp))}${one.covariance ? `, ± ${sure(one.covariance)} mm` : ""}`)))));
     if (!found.length) side.markers.append(h("li", { class: "hint" }, "None found yet"));
   };
   draw();
   stops.push(live.watch("camera/+/marker/+", draw));
 }
+
+/** The larger half axis at one sigma, in mm. */
+const sure = (covariance) => Math.max(1, Math.round((ellipse(covariance)[0] / SIGMAS) * 1000));
 
 /** Half axes of the horizontal part, metres at SIGMAS, and how the first is turned, degrees. */
 function ellipse(covariance) {
@@ -287,7 +291,7 @@ function driving({ robot, map, layers, side, stops }) {
       goal();
     }),
     live.watch(`mission/${robot.name}/state`, ({ json }) => {
-      text(state, json.state.replace("_", " "));
+      text(state, WORDS[json.state] ?? json.state);
       text(said, json.marker === null ? "" : `marker ${json.marker}${json.place ? `, ${json.place}` : ""}`);
       goal();
     }),

@@ -12,7 +12,7 @@ const LATE = 12; // rows drawn beyond what is seen
 const KINDS = { s: "state", e: "event", c: "command", b: "blob" };
 
 export function show(root, { may }) {
-  const filter = h("input", { type: "search", placeholder: "camera/#  or a word", "aria-label": "Filter topics", oninput: () => draw() });
+  const filter = h("input", { type: "search", placeholder: "Filter: camera/#", "aria-label": "Filter topics", oninput: () => draw() });
   const stopped = h("input", { type: "checkbox", id: "hold", onchange: () => draw() });
   const count = badge("");
   const rows = h("div", { class: "rows", role: "rowgroup" });

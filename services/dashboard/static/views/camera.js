@@ -9,6 +9,8 @@ import { video } from "./video.js";
 export const topics = ["camera/#", "/dashboard/thumbnails/+"];
 
 const LOGGED = 8;
+const MODES = { auto: "Automatic", color: "Colour", bw: "Black and white", scan: "For scans" };
+const ENDS = { idle: "Nothing was looked for yet", done: "Done", cancelled: "Cancelled", failed: "Failed" };
 const KINDS = { online: "good", degraded: "warn" };
 
 export function show(root, context) {
@@ -38,13 +40,14 @@ function one(stage, camera, may, state) {
   const where = h("dl", { class: "where" });
   const streaming = h("button", { onclick: () => order("MJPEG", streaming.getAttribute("aria-pressed") !== "true"), "aria-pressed": "false" }, "Live picture");
   const stops = [];
-  const parts = [places(name, may, order, stops), may ? controls(order, stops) : null, scan(camera, may, order, stops), may ? looks(name, order) : null, may ? sound(name, order, stops) : null, log(name, stops)];
+  const parts = [places(name, may, order, stops), may ? controls(order, stops) : null, scan(camera, may, order, stops), may ? looks(name, order, stops) : null, may ? sound(name, order, stops) : null, log(name, stops)];
   stage.replaceChildren(h("div", { class: "columns camera" },
     h("div", { class: "stack" },
       h("section", { class: "panel flush" }, picture.element, h("div", { class: "below" }, where, may ? streaming : null)),
       parts[0]),
     h("div", { class: "stack" }, parts.slice(1))));
 
+  state.replaceChildren(h("span", { class: "hint" }, "Its service has said nothing yet"));
   const line = (label, value) => h("div", {}, h("dt", {}, label), h("dd", {}, value));
   stops.push(
     live.watch(at("position"), ({ json }) => where.replaceChildren(line("Pan", `${json.pan.toFixed(1)}°`), line("Tilt", `${json.tilt.toFixed(1)}°`), line("Zoom", `${json.zoom}`), line("Place", json.moving ? "moving …" : (json.place ?? "–")))),
@@ -90,7 +93,9 @@ function places(name, may, order, stops) {
       return h("li", {}, h("button", { onclick: () => order("Goto", place), disabled: !may, "aria-current": place === here ? "true" : null },
         pictures[place] ? h("img", { src: source, alt: "", loading: "lazy" }) : h("span", { class: "blank" }, icon("camera")), h("span", {}, place)));
     }));
+    if (!list.children.length) list.append(h("li", { class: "hint" }, "None saved yet"));
   };
+  draw();
   stops.push(live.watch(`camera/${name}/places`, draw), live.watch(`camera/${name}/position`, draw), live.watch(`/dashboard/thumbnails/${name}`, draw));
   const remove = h("button", { class: "quiet", onclick: () => {
     const here = live.get(`camera/${name}/position`)?.json?.place;
@@ -112,24 +117,61 @@ function scan(camera, may, order, stops) {
     bar.value = running || json.state === "done" ? json.progress : 0;
     cancel.disabled = !running;
     const turn = json.turn > 1 ? `, turn ${json.turn}` : "";
-    text(said, running ? `Looking from ${json.place ?? "…"}${turn}: ${json.frames_analysed} pictures, ${Math.round(json.elapsed_s)} s` : `${json.state}${json.reason ? `: ${json.reason}` : ""}${json.state === "done" ? ` in ${Math.round(json.elapsed_s)} s, found ${json.found.join(", ") || "nothing"}` : ""}`);
+    text(said, running ? `Looking from ${json.place ?? "…"}${turn}: ${json.frames_analysed} pictures, ${Math.round(json.elapsed_s)} s` : `${ENDS[json.state]}${json.reason ? `: ${json.reason}` : ""}${json.state === "done" ? ` in ${Math.round(json.elapsed_s)} s, found ${json.found.join(", ") || "nothing"}` : ""}`);
   }));
   const draw = () => found.replaceChildren(...live.all(`camera/${name}/marker/+`).map(({ json }) => {
     const p = json.position;
     const sigma = json.covariance ? Math.sqrt(Math.max(json.covariance[0][0], json.covariance[1][1], json.covariance[2][2])) : null;
-    return h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, json.place, h("span", { class: "hint" }, ` ${ago(Date.parse(json.stamp))}`)),
+    return h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, `from ${json.place}`, h("span", { class: "hint" }, ` ${ago(Date.parse(json.stamp))}`)),
       h("span", { class: "number" }, p ? `${p.x.toFixed(2)}, ${p.y.toFixed(2)}, ${p.z.toFixed(2)} m${sigma ? ` ± ${(sigma * 1000).toFixed(0)} mm` : ""}` : json.why));
   }));
   stops.push(live.watch(`camera/${name}/marker/+`, draw));
-  return panel("Scan for markers", may ? h("div", { class: "row" }, h("label", { class: "inline", for: "targets" }, "Markers"), targets, start, cancel) : null, bar, said, found);
+  return panel("Scan for markers", may ? h("div", { class: "row" }, h("label", { class: "inline", for: "targets" }, "Markers"), targets, start, cancel) : null, bar, said, found, analysed(name, may, order, stops));
 }
 
-function looks(name, order) {
-  const pair = (key, label) => h("div", { class: "pair-row" }, h("span", {}, label), h("span", { class: "buttons" },
-    h("button", { onclick: () => order(key, true), "aria-label": `${label} on` }, "On"), h("button", { onclick: () => order(key, false), "aria-label": `${label} off` }, "Off")));
-  const mode = h("select", { "aria-label": "Video mode", onchange: () => mode.value && order("VideoMode", mode.value) },
-    [["", "Choose …"], ["auto", "Automatic"], ["color", "Colour"], ["bw", "Black and white"], ["scan", "For scans"]].map(([value, label]) => h("option", { value }, label)));
-  return panel("Picture", pair("Privacy", "Privacy"), pair("Flip", "Flip"), pair("Mirror", "Mirror"),
+/** What the scan looks at, the markers drawn into it; the next is fetched when the one before is there. */
+function analysed(name, may, order, stops) {
+  const image = h("img", { alt: "The picture that the scan analysed last, its markers drawn" });
+  const caption = h("figcaption", { class: "hint" });
+  const figure = h("figure", { class: "analysed", hidden: true }, image, caption);
+  let [newest, loading] = [0, 0];
+  const load = () => {
+    if (loading || document.hidden) return;
+    loading = newest;
+    image.src = `/api/cameras/${name}/scan.jpg?${newest}`;
+  };
+  image.onload = () => {
+    const shown = loading;
+    loading = 0;
+    figure.hidden = false;
+    text(caption, `Analysed at ${clock(shown)}`);
+    if (newest > shown) load();
+  };
+  image.onerror = () => { loading = 0; };
+  stops.push(live.watch(`camera/${name}/scan/image`, ({ at }) => {
+    newest = at;
+    load();
+  }));
+  if (!may) return figure;
+  const box = h("input", { type: "checkbox", id: "analysed", onchange: () => order("ScanImgPub", box.checked) });
+  stops.push(ordered(name, "ScanImgPub", (value) => { box.checked = flag(value); }));
+  return [h("label", { class: "inline tick", for: "analysed" }, box, "Show what it looks at"), figure];
+}
+
+/** Calls `take(value)` for each order of that key that was done: nothing else tells how some options stand. */
+const ordered = (name, key, take) => live.watch(`camera/${name}/order_result`, ({ json }) => json.key === key && json.state === "done" && take(json.value));
+const flag = (value) => ["true", "on", "1"].includes(`${value}`.toLowerCase());
+
+function looks(name, order, stops) {
+  const pair = (key) => {
+    const [on, off] = [true, false].map((value) => h("button", { onclick: () => order(key, value), "aria-label": `${key} ${value ? "on" : "off"}`, "aria-pressed": "false" }, value ? "On" : "Off"));
+    stops.push(ordered(name, key, (value) => [on, off].forEach((one) => one.setAttribute("aria-pressed", `${(one === on) === flag(value)}`))));
+    return h("div", { class: "pair-row" }, h("span", {}, key), h("span", { class: "buttons" }, on, off));
+  };
+  const mode = h("select", { "aria-label": "Video mode", onchange: () => order("VideoMode", mode.value) },
+    h("option", { value: "", disabled: true, selected: true }, "Choose …"), Object.entries(MODES).map(([value, label]) => h("option", { value }, label)));
+  stops.push(ordered(name, "VideoMode", (value) => { mode.value = value in MODES ? value : ""; }));
+  return panel("Picture", pair("Privacy"), pair("Flip"), pair("Mirror"),
     h("div", { class: "pair-row" }, h("span", {}, "Video mode"), mode),
     h("div", { class: "row" }, h("a", { class: "button", href: `/api/cameras/${name}/snapshot.jpg`, download: `${name}.jpg` }, "Snapshot"),
       h("button", { class: "danger", onclick: () => confirm("Restart the camera? It is away for about a minute.") && order("Reboot", true) }, "Restart camera")));
@@ -152,7 +194,7 @@ function sound(name, order, stops) {
 }
 
 function log(name, stops) {
-  const list = h("ol", { class: "log" });
+  const list = h("ol", { class: "log" }, h("li", { class: "hint" }, "None yet"));
   const orders = new Map();
   stops.push(live.watch(`camera/${name}/order_result`, ({ json, at }) => {
     orders.delete(json.id);

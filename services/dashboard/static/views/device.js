@@ -1,7 +1,7 @@
 // One item of the home: its value, and the control that fits its type.
 
 import * as api from "../api.js";
-import { h, icon, text } from "../dom.js";
+import { h, icon, text, WORDS } from "../dom.js";
 
 const CONFIRM_S = 6;
 const NOTHING = new Set(["NULL", "UNDEF", ""]);
@@ -38,13 +38,16 @@ class Waiting {
     Object.assign(this, { name, note, show, timer: 0, confirms: null });
   }
 
+  /** `confirms` tells whether a state does; null: none has to, the command itself is all (a STOP, a NEXT). */
   async send(command, confirms = (state) => state === command) {
     clearTimeout(this.timer);
     this.confirms = confirms;
     text(this.note, "");
     this.show(true);
     this.timer = setTimeout(() => this.done("no answer"), CONFIRM_S * 1000);
-    if ((await api.order(`/api/items/${this.name}/command`, { value: command })) === null) this.done("not sent");
+    const said = await api.order(`/api/items/${this.name}/command`, { value: command });
+    if (said === null) this.done("not sent");
+    else if (confirms === null) this.done("");
   }
 
   heard(state, fresh) {
@@ -78,8 +81,6 @@ function readable(item, state) {
   if (item.type === "Number" && item.unit && /^[-+.\d]+$/.test(state)) return `${state} ${item.unit}`;
   return state;
 }
-
-const WORDS = { ON: "On", OFF: "Off", OPEN: "Open", CLOSED: "Closed" };
 
 function isOn(item, state) {
   if (item.type === "Switch" || item.type === "Contact") return state === "ON" || state === "OPEN";
@@ -135,16 +136,17 @@ function stepper(item, send) {
 }
 
 function shutter(item, send) {
-  const any = () => true;
-  const button = (command, label) => h("button", { onclick: () => send(command, any), "aria-label": `${item.label}: ${label}` }, icon(label));
+  const ends = { UP: 0, DOWN: 100 };
+  let now = Number.NaN;
+  const button = (command, label) => h("button", { onclick: () => send(command, now === (ends[command] ?? now) ? null : () => true), "aria-label": `${item.label}: ${label}` }, icon(label));
   const element = h("span", { class: "buttons" }, button("UP", "up"), button("STOP", "stop"), button("DOWN", "down"));
-  return { element, show() {} };
+  return { element, show: (state) => { now = number(state); } };
 }
 
 function player(item, send) {
   const play = h("button", { "aria-label": `${item.label}: play or pause`, onclick: () => send(playing ? "PAUSE" : "PLAY") }, icon("play"));
   let playing = false;
-  const skip = (command, label) => h("button", { onclick: () => send(command, () => true), "aria-label": `${item.label}: ${label}` }, icon(label));
+  const skip = (command, label) => h("button", { onclick: () => send(command, null), "aria-label": `${item.label}: ${label}` }, icon(label));
   const element = h("span", { class: "buttons" }, skip("PREVIOUS", "previous"), play, skip("NEXT", "next"));
   return { element, hides: true, show(state) {
     playing = state === "PLAY";

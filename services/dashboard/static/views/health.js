@@ -26,7 +26,7 @@ export function show(root) {
         h("section", { class: "panel" }, h("h2", {}, "Messages per second"), rates),
         h("section", { class: "panel" }, h("h2", {}, "Services"),
           h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Services" }, h("table", { class: "services" }, h("thead", {}, h("tr", {},
-            ["Service", "State", "Since", "In", "Out", "Bad"].map((title) => h("th", { scope: "col" }, title)))), services))))));
+            ["Service", "State", "Started", "Heard", "Said", "Refused"].map((title) => h("th", { scope: "col" }, title)))), services))))));
 
   function drawTree() {
     const top = branches(live.all("diagnostics/#"));

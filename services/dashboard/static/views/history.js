@@ -1,7 +1,7 @@
 // What was: any items over any span, plotted by unit; drag to zoom, and take it away as CSV.
 
 import * as api from "../api.js";
-import { badge, h, head, text, toast } from "../dom.js";
+import { h, head, toast } from "../dom.js";
 import { colourOf, plot, strip } from "./plot.js";
 
 export const topics = [];
@@ -18,7 +18,6 @@ export function show(root, { apartment }) {
   let turn = 0;
   let closing = [];
   const plots = h("div", { class: "stack plots" });
-  const spent = badge("");
   const back = h("button", { onclick: () => before.length && go(...before.pop(), false), disabled: true }, "Zoom out");
   const buttons = Object.entries(SPANS).map(([label, seconds]) => h("button", { "data-span": label, onclick: () => go(Date.now() / 1000 - seconds, Date.now() / 1000) }, label));
   const from = h("input", { type: "datetime-local", "aria-label": "From", onchange: () => typed() });
@@ -30,7 +29,7 @@ export function show(root, { apartment }) {
     const csv = h("a", { class: "csv", download: true, "aria-label": `${item.label} as CSV` }, "CSV");
     return { name, item, box, csv, row: h("li", {}, box, h("label", { for: `item-${name}` }, h("span", { class: "key" }), item.label), csv) };
   });
-  root.append(head("History", spent),
+  root.append(head("History"),
     h("div", { class: "row spans" }, buttons, h("span", { class: "row dates" }, from, h("span", { class: "hint" }, "to"), to), back),
     h("div", { class: "columns history" }, h("section", { class: "panel" }, plots), h("section", { class: "panel items" }, h("h2", {}, "Items"), search, h("ul", {}, boxes.map((one) => one.row)))));
 
@@ -80,18 +79,16 @@ export function show(root, { apartment }) {
       one.row.querySelector(".key").style.background = chosen.has(one.name) ? `var(${colourOf(names.indexOf(one.name))})` : "";
     }
     plots.setAttribute("aria-busy", "true");
-    const begin = performance.now();
     const width = Math.min(1500, Math.max(200, Math.round(plots.clientWidth || 800)));
     const found = await Promise.all(names.map((name) => api.get(`/api/history/${name}?${query(width)}`).catch((error) => ({ item: name, fault: error.message, rows: [] }))));
     if (mine !== turn) return;
-    text(spent, names.length ? `${Math.round(performance.now() - begin)} ms` : "");
     close();
     plots.replaceChildren();
     for (const one of found.filter((series) => series.fault)) plots.append(h("p", { class: "why" }, `${one.item}: ${one.fault}`));
     await drawNumbers(found.filter((one) => !one.fault && NUMBERS.has(apartment.items[one.item].type)), names, mine);
     if (mine !== turn) return;
     const states = found.filter((one) => !one.fault && !NUMBERS.has(apartment.items[one.item].type));
-    plots.append(...states.map((one) => strip(one, apartment.items[one.item].label, since, until)));
+    plots.append(...states.map((one) => strip(one, apartment.items[one.item], since, until)));
     if (!names.length) plots.append(h("p", { class: "empty" }, "Choose items to see what was."));
     plots.setAttribute("aria-busy", "false");
   }

@@ -1,4 +1,4 @@
-// Missions of the robots: sent, watched and cancelled here; and where a marker was last.
+// Missions of the robots: sent, watched and cancelled here, those that were, and where a marker was last.
 
 import * as api from "../api.js";
 import { ago, badge, clock, h, head, text } from "../dom.js";
@@ -6,8 +6,9 @@ import * as live from "../live.js";
 
 export const topics = ["mission/#", "robot/+/goto/result"];
 
+const SHOWN = 20;
 const ENDS = { found: "good", not_found: "warn", failed: "bad", cancelled: "", refused: "bad" };
-const WORDS = { idle: "Waiting for orders", go: "On the way", look: "Looking", scan: "The house looks", found: "Found", not_found: "Not found", failed: "Failed", cancelled: "Cancelled", refused: "Refused" };
+export const WORDS = { idle: "Waiting for orders", go: "On the way", look: "Looking", scan: "The house looks", found: "Found", not_found: "Not found", failed: "Failed", cancelled: "Cancelled", refused: "Refused" };
 
 export function show(root, { apartment, may }) {
   root.append(head("Missions"));
@@ -26,16 +27,24 @@ function one(root, name, may) {
     api.order(`/api/missions/${name}/find`, { find: id() });
   };
   const now = h("p", { class: "now" });
-  const why = h("p", { class: "hint" });
+  const why = h("p", { class: "hint" }, "The mission service has said nothing yet.");
   const steps = h("ol", { class: "timeline" });
   const answer = h("ul", { class: "found" });
   const results = h("div", { class: "stack" });
+  const missing = h("p", { class: "hint" });
   const form = may ? h("form", { class: "row", onsubmit: submit }, h("label", { class: "inline", for: marker.id }, "Marker"), marker, h("button", { class: "main", type: "submit" }, "Find"), cancel, where) : null;
   root.append(h("div", { class: "columns missions" },
     h("div", { class: "stack" }, h("section", { class: "panel", "data-robot": name }, h("h2", {}, name), form, now, why, steps), h("section", { class: "panel", hidden: true }, h("h2", {}, "Last seen"), answer)),
-    h("section", { class: "panel" }, h("h2", {}, "Past missions"), results)));
+    h("section", { class: "panel" }, h("h2", {}, "Past missions"), missing, results)));
   const states = [];
   const past = new Map();
+  let gone = false;
+  const draw = () => {
+    const open = new Set([...results.querySelectorAll("details[open]")].map((one) => one.dataset.mission));
+    const newest = [...past.values()].sort((one, other) => Date.parse(other.stamp) - Date.parse(one.stamp)).slice(0, SHOWN);
+    results.replaceChildren(...newest.map((result, index) => told(result, index === 0 || open.has(result.id))));
+    if (!newest.length) results.append(h("p", { class: "empty" }, "None yet."));
+  };
   const stops = [
     live.watch(`mission/${name}/state`, ({ json, at }) => {
       text(now, `${WORDS[json.state] ?? json.state}${json.marker === null ? "" : `: marker ${json.marker}`}${json.place ? `, ${json.place}` : ""}`);
@@ -45,12 +54,11 @@ function one(root, name, may) {
       if (states.length && states.at(-1).id !== json.id) states.length = 0;
       const last = states.at(-1);
       if (!last || last.state !== json.state || last.place !== json.place || last.reason !== json.reason) states.push({ ...json, at });
-      steps.replaceChildren(...states.map((step, index) => h("li", { class: index === states.length - 1 ? "current" : "", "data-state": step.state },
-        h("time", {}, clock(step.at)), h("span", {}, WORDS[step.state] ?? step.state, step.place ? `: ${step.place}` : ""), h("span", { class: "hint" }, step.reason))));
+      steps.replaceChildren(...states.map((step, index) => line(step.state, clock(step.at), step.reason || step.place, index === states.length - 1)));
     }),
     live.watch(`mission/${name}/result`, ({ json }) => {
       past.set(json.id, json);
-      results.replaceChildren(...[...past.values()].reverse().map((result, index) => told(result, index === 0)));
+      draw();
       if (states.at(-1)?.id === json.id) states.length = 0;
     }),
     live.watch(`mission/${name}/where/reply/+`, ({ json, fresh }) => {
@@ -61,9 +69,22 @@ function one(root, name, may) {
       if (!json.sightings.length) answer.append(h("li", {}, `Nobody has seen marker ${json.marker}`));
     }),
   ];
-  if (!past.size) results.append(h("p", { class: "empty" }, "None since the dashboard was started."));
-  return () => { for (const stop of stops) stop(); };
+  draw();
+  stored(name).then((found) => {
+    if (gone) return;
+    for (const result of found) if (!past.has(result.id)) past.set(result.id, result);
+    draw();
+  }).catch((error) => text(missing, `Only those since the dashboard was started: ${error.message}.`));
+  return () => {
+    gone = true;
+    for (const stop of stops) stop();
+  };
 }
+
+/** What the database has of them. */
+const stored = async (name) => (await api.get(`/api/missions/${name}/past`)).missions;
+
+const line = (state, when, why, current) => h("li", { class: current ? "current" : "", "data-state": state }, h("time", {}, when), h("span", {}, h("span", { class: "step" }, WORDS[state] ?? state), " ", h("span", { class: "hint" }, why)));
 
 function told(result, open) {
   const total = Math.max(result.elapsed_s, 0.001);
@@ -74,8 +95,8 @@ function told(result, open) {
     return part;
   });
   const position = result.position ? `${result.position.x.toFixed(2)}, ${result.position.y.toFixed(2)} m` : "";
-  return h("details", { open }, h("summary", {}, h("strong", {}, `Marker ${result.marker}`), badge(WORDS[result.state] ?? result.state, ENDS[result.state]), h("span", { class: "hint" }, `${[result.place, position, result.by ? `by ${result.by}` : ""].filter(Boolean).join(" · ")}`), h("span", { class: "hint number" }, `${ago(Date.parse(result.stamp))} · ${Math.round(result.elapsed_s)} s`)),
+  return h("details", { open, "data-mission": result.id }, h("summary", {}, h("strong", {}, `Marker ${result.marker}`), badge(WORDS[result.state] ?? result.state, ENDS[result.state]), h("span", { class: "hint" }, `${[result.place, position, result.by ? `by ${result.by}` : ""].filter(Boolean).join(" · ")}`), h("span", { class: "hint number" }, `${ago(Date.parse(result.stamp))} · ${Math.round(result.elapsed_s)} s`)),
     result.reason ? h("p", { class: "hint" }, result.reason) : null,
     h("div", { class: "bars", "aria-hidden": "true" }, bars),
-    h("ol", { class: "timeline" }, result.story.map((event) => h("li", { "data-state": event.state }, h("time", {}, `${event.at_s.toFixed(0)} s`), h("span", {}, WORDS[event.state] ?? event.state), h("span", { class: "hint" }, event.text)))));
+    h("ol", { class: "timeline" }, result.story.map((event) => line(event.state, `${event.at_s.toFixed(0)} s`, event.text, false))));
 }

@@ -1,6 +1,6 @@
 // Plots of one unit each by uPlot (vendor/), and strips of states. Not here: what is plotted (history.js).
 
-import { h, s } from "../dom.js";
+import { h, s, WORDS } from "../dom.js";
 
 const HEIGHT = 240;
 const COLOURS = ["--c1", "--c2", "--c3", "--c4", "--c5", "--c6"];
@@ -89,14 +89,15 @@ const WIDTH = 1000;
 const STRONG = new Set(["ON", "OPEN", "PLAY", "UP"]);
 
 /** A strip for each item whose states are words: when it was what. */
-export function strip(series, label, since, until) {
+export function strip(series, { label, options }, since, until) {
+  const word = (state) => options[state] ?? WORDS[state] ?? state;
   const at = (time) => ((Math.min(until, Math.max(since, time)) - since) / (until - since)) * WIDTH;
   const drawn = s("svg", { viewBox: `0 0 ${WIDTH} 22`, preserveAspectRatio: "none", role: "img", "aria-label": `${label}: ${series.rows.length} states` });
   const kinds = [...new Set(series.rows.map(([, state]) => state))];
   series.rows.forEach(([time, state], index) => {
     const end = series.rows[index + 1]?.[0] ?? Math.min(until, Date.now() / 1000);
     const kind = STRONG.has(state) ? "strong" : ["OFF", "CLOSED", "PAUSE", "NULL", "UNDEF"].includes(state) ? "weak" : `k${kinds.indexOf(state) % 4}`;
-    if (end > since) drawn.append(s("rect", { x: at(time), y: 0, width: Math.max(0.7, at(end) - at(time)), height: 22, class: kind }, s("title", {}, `${state}, ${new Date(time * 1000).toLocaleString()}`)));
+    if (end > since) drawn.append(s("rect", { x: at(time), y: 0, width: Math.max(0.7, at(end) - at(time)), height: 22, class: kind }, s("title", {}, `${word(state)}, ${new Date(time * 1000).toLocaleString()}`)));
   });
-  return h("div", { class: "strip" }, h("span", {}, label), drawn, h("span", { class: "hint" }, `${series.rows.at(-1)?.[1] ?? "–"}`));
+  return h("div", { class: "strip" }, h("span", {}, label), drawn, h("span", { class: "hint" }, series.rows.length ? word(series.rows.at(-1)[1]) : "–"));
 }

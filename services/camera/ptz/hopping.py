@@ -1,0 +1,184 @@
+"""A goal by the relative form: each hop goes on by a part of the picture, all axes at once, and ends by itself.
+
+A hop may begin while the last one, or a start at full speed, still turns. Where it leads depends on where the camera
+was just then: that is known when it was answered, not before, so the last hop of a long way leaves some degrees to
+one more that begins at rest. A late hop pushes nothing against a stop. Not here: how an axis glides (`glide.py`), how
+large the scale is (`scale.py`).
+"""
+
+from __future__ import annotations
+
+from math import radians, tan
+from typing import cast
+
+from services.camera.plan import Plan, wait
+from services.camera.ptz import scale
+from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.driving import at_rest
+from services.camera.ptz.glide import Glide
+from services.camera.ptz.helm import Helm, levels_of, sign
+from services.camera.ptz.pace import ACT_PART, HALF_CHANGE
+from services.camera.ptz.scale import FORM, Hop
+from services.camera.requests import MoveOver, Reading, Refused, Reply, Status
+
+MOST = 6  # hops without a rest
+TURNS = 4  # of them in one move
+MIDDLE = 0.95  # of the picture's half is gone in one hop at most
+SPARE_LEVELS = 1.0  # beyond an end of zoom's range, so that it is met exactly
+ABOUT_DEG = 3.0  # a hop that ends so far from where it should is followed by another at once
+MIDST_DEG = 6.0  # what is farther off was out of reach, and not the fault of a late answer
+SHARP_DEG = 0.05  # what the reckoning leaves open, at least
+TRY_DEG = 12.0  # a first hop, whose scale is a guess
+BULK = 1.5  # answers: a start at full speed that is shorter is not worth it
+FEW = 4  # commands, for a hop, another from rest, and looks
+
+
+class Hopping:
+    """The hops of one move."""
+
+    def __init__(self, helm: Helm) -> None:
+        self.helm = helm
+        self.turns = 0
+        self.zooms = False  # whether zoom is to change
+        self.glides: list[Glide] = []
+        self.hops: list[Hop] = []
+
+    def hop(self, now: float) -> Plan[tuple[Reading, float] | None]:
+        """Goes to the goal, or near; None where the firmware has no such form, or it did not help."""
+        skill = self.helm.skill
+        honoured = skill.honours.get(FORM, "unknown")
+        able = honoured in ("unknown", "yes") and all(one.sure for one in skill.senses)
+        if not able or self.turns >= TURNS or self.helm.left < FEW:
+            return None
+        self.turns += 1
+        self.glides, self.hops = [], []
+        self.zooms = abs(self.helm.aim[ZOOM] - self.helm.course.origin[ZOOM]) > self.helm.zoom_near / 2
+        try:
+            now = yield from (self._chain(now) if honoured == "yes" else self._send(now, TRY_DEG))
+        except Refused:
+            skill.honours[FORM] = "no"
+            return None
+        pan, tilt, zoom = self.glides
+        to = (pan.goal, tilt.goal, zoom.goal)
+        arrives = max(self._ends(), zoom.ends)
+        reading, now = yield from at_rest(self.helm, arrives, to, now, certain=honoured == "yes", about=ABOUT_DEG)
+        scale.learn(skill, self.hops, to, self.helm.limits, reading)
+        self.helm.stand(reading)
+        return reading, now
+
+    def _chain(self, now: float) -> Plan[float]:
+        """To where the goal can be reached, there in flight, and from rest what is left then."""
+        timing = self.helm.skill.timing
+        now = yield from self._rush(now)
+        for _ in range(MOST):
+            now = yield from self._send(now)
+            off = {axis: abs(self.helm.aim[axis] - self.glides[axis].goal) for axis in (PAN, TILT)}
+            worst = max(off, key=lambda axis: off[axis])
+            if off[worst] <= self.helm.skill.near - SHARP_DEG or self.helm.left < FEW:
+                break
+            far = off[worst] > MIDST_DEG
+            follows = self.glides[worst].brakes - timing.spread if far else self._ends()
+            now = yield from wait(max(now, follows - timing.usual))
+        return now
+
+    def _rush(self, now: float) -> Plan[float]:
+        """A way that takes several hops begins with a start at full speed, while a late answer does no harm."""
+        helm, timing = self.helm, self.helm.skill.timing
+        ways = {axis: helm.aim[axis] - helm.course.origin[axis] for axis in (PAN, TILT)}
+        rates = {axis: helm.skill.paces[axis].rate(helm.skill.paces[axis].speeds[-1]) for axis in ways}
+        lead = max(ways, key=lambda axis: abs(ways[axis]) / rates[axis])
+        safe = abs(ways[lead]) + self._room(lead, ways[lead]) - rates[lead] * timing.tail
+        held = min(abs(ways[lead]) - self._before(lead), safe) / rates[lead]
+        if held < BULK * timing.usual:
+            return now
+        turning = {axis: self._along(axis, way, held) * sign(way) for axis, way in ways.items() if helm.skill.diagonals}
+        turning[lead] = helm.skill.paces[lead].speeds[-1] * sign(ways[lead])
+        now = (yield from helm.start(levels_of(turning))).received
+        pace, level, way = helm.skill.paces[lead], abs(turning[lead]), sign(ways[lead])
+        end = helm.course.origin[lead] + way * (held * rates[lead] + pace.change(level) * pace.rate(level) / 2)
+        for early in (True, False):  # once soon, as long as the speed is not known, and once before the end
+            look = helm.course.end_for(lead, end, now) - 2 * timing.usual - timing.spread
+            if look < now or (early and pace.known(level)):
+                continue
+            yield from wait(min(look, now + timing.usual) if early else look)
+            reply = yield from helm.send(Status())
+            now = reply.received
+            helm.course.read(reply, cast(Reading, reply.result))
+        return (yield from wait(max(now, helm.course.end_for(lead, end, now) - timing.usual)))
+
+    def _before(self, axis: int) -> float:
+        """How far before its goal a hop should begin that leads there: within its reach, and before it would brake."""
+        pace, reach = self.helm.skill.paces[axis], self._reach(axis, self.helm.course.origin[ZOOM])
+        rate = pace.rate(pace.speeds[-1])
+        brakes = rate * rate * pace.other(HALF_CHANGE)
+        return max((reach + brakes) / 2, reach - rate * self.helm.skill.timing.spread)
+
+    def _room(self, axis: int, way: float) -> float:
+        low, high = self.helm.limits.ranges[axis]
+        return high - self.helm.aim[axis] if way > 0 else self.helm.aim[axis] - low
+
+    def _along(self, axis: int, way: float, held: float) -> int:
+        """The speed of an axis in the rush: it stays before its goal, and if that ends late before its stop."""
+        pace, room = self.helm.skill.paces[axis], self._room(axis, way)
+        for speed in reversed(pace.speeds):
+            rate = pace.rate(speed)
+            if rate * held <= abs(way) and rate * (held + self.helm.skill.timing.tail) <= abs(way) + room:
+                return speed
+        return 0
+
+    def _reach(self, axis: int, zoom: float) -> float:
+        """How far one hop goes at most, degrees."""
+        return scale.angle(MIDDLE, scale.plane(zoom, self.helm.skill)[axis])
+
+    def _send(self, now: float, most: float = 90.0) -> Plan[float]:
+        """One hop towards the goal, from where it will be when that takes effect."""
+        helm = self.helm
+        there = [self._at(axis, now + helm.skill.timing.usual)[0] for axis in range(3)]
+        planes, parts = scale.plane(there[ZOOM], helm.skill), []
+        for axis in (PAN, TILT):
+            reach = min(most, self._reach(axis, there[ZOOM]))
+            way = min(reach, max(-reach, helm.aim[axis] - there[axis]))
+            parts.append(helm.skill.senses[axis].sign * tan(radians(way)) / planes[axis])
+        right, down = (min(1.0, max(-1.0, part)) for part in parts)
+        zooms = helm.skill.honours.get(scale.ZOOMS) != "no" and most > TRY_DEG
+        request = MoveOver(right, down, self._zoom_aim() - there[ZOOM] if zooms and self.zooms else 0.0)
+        self._glide(request, (yield from helm.send(request)))
+        return self.glides[0].answered
+
+    def _zoom_aim(self) -> float:
+        low, high = self.helm.limits.zoom
+        aim = self.helm.aim[ZOOM]
+        return aim - SPARE_LEVELS if aim == low else aim + SPARE_LEVELS if aim == high else aim
+
+    def _glide(self, request: MoveOver, reply: Reply) -> None:
+        """Where it leads, now that it is known from where."""
+        helm = self.helm
+        late = reply.received - reply.sent - helm.skill.timing.usual
+        acted = reply.received - helm.skill.paces[PAN].other(ACT_PART) * late
+        poses = [self._at(axis, acted) for axis in range(3)]
+        planes = scale.plane(poses[ZOOM][0], helm.skill)
+        right, down = (
+            scale.angle(part, planes[axis]) * helm.skill.senses[axis].sign
+            for axis, part in enumerate((request.right, request.down))
+        )
+        self.glides = []
+        for axis, (way, (place, speed)) in enumerate(zip((right, down, request.zoom), poses, strict=True)):
+            low, high = helm.limits.ranges[axis]
+            pace = helm.skill.drives[ZOOM] if axis == ZOOM else helm.skill.paces[axis]
+            top, slow = pace.rate(pace.speeds[-1]), 2 * pace.other(HALF_CHANGE)
+            goal = min(high, max(low, place + way))
+            self.glides.append(Glide(acted, place, speed, goal, top, 1 / slow, reply.received))
+        begun = (poses[PAN][0], poses[TILT][0], poses[ZOOM][0])
+        self.hops.append(Hop(begun, (right, down, request.zoom), (poses[PAN][1], poses[TILT][1], poses[ZOOM][1])))
+        helm.course.leave(begun)
+
+    def _at(self, axis: int, when: float) -> tuple[float, float]:
+        """Place and speed of an axis."""
+        if self.glides:
+            return self.glides[axis].at(when)
+        course = self.helm.course
+        return course.at(axis, when), self.helm.skill.paces[axis].velocity(course.told[axis], when)
+
+    def _ends(self) -> float:
+        """When pan and tilt rest."""
+        return max(glide.ends for glide in self.glides[:ZOOM])

@@ -1,0 +1,49 @@
+"""Goals by the relative form: how an axis glides, and a camera of another make whose scale nobody has told."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from services.camera.ptz.glide import Glide
+from services.camera.ptz.goal import Limits
+from services.camera.ptz.move import goto
+from services.camera.ptz.skill import Skill
+from services.camera.requests import MoveOver
+from services.simulators.camera.track import Moment, Rail, go
+from tests.camera.goals import random_goals
+from tests.camera.motors import Motors, drive
+
+LIMITS = Limits()
+RAIL = Rail(-100.0, 100.0, (45.0,), 120.0)
+
+
+@pytest.mark.parametrize("turn", range(20))
+def test_an_axis_glides_as_a_motor_with_its_top_speed_and_acceleration_does(turn: int) -> None:
+    rng = random.Random(turn)
+    place, speed, goal = rng.uniform(-60, 60), rng.uniform(-45, 45), rng.uniform(-60, 60)
+    track, glide = go(RAIL, Moment(place, speed), 0.0, goal, 45.0), Glide(0.0, place, speed, goal, 45.0, 120.0, 0.0)
+    assert glide.ends == pytest.approx(track.ends, abs=1e-6)
+    for step in range(1, 10):
+        at = track.ends * step / 9
+        assert glide.at(at) == pytest.approx(tuple(track.at(at)), abs=1e-6)
+
+
+@pytest.mark.parametrize("mirror", [True, False])
+def test_a_relative_form_is_found_and_its_scale_learnt_whatever_that_is(mirror: bool) -> None:
+    motors, skill, now = Motors(relative=True, acceleration=90.0, mirror=mirror), Skill(), 1000.0
+    motors.now = now
+    hops = []
+    for pan, tilt, zoom in random_goals(12, 3):
+        motors.sent.clear()
+        run, took = drive(goto(LIMITS.goal(pan, tilt, zoom), LIMITS, skill, now + 60.0), motors, now=now)
+        now += took
+        assert run.error is None
+        assert not motors.moving
+        assert abs(LIMITS.unwrap(motors.pose[0]) - LIMITS.unwrap(pan)) <= 0.5
+        assert abs(motors.pose[1] - tilt) <= 0.5
+        hops.append(sum(isinstance(request, MoveOver) for request in motors.sent))
+    assert skill.honours["Position"] == "yes"
+    assert all(hops[-6:])
+    assert not motors.pushed

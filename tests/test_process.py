@@ -1,0 +1,56 @@
+"""A service's process and its supervisor: the clock that is set back, and an end that a grandchild would hide."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+
+import pytest
+
+from services import peers
+from services.process import Clock
+from services.supervisor import Supervisor, in_background
+
+HOLDS_THE_PIPE = """
+import subprocess, sys
+waits = subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"], start_new_session=True)
+print('READY {"waits": %d}' % waits.pid, flush=True)
+waits.wait()
+"""
+
+
+@pytest.mark.parametrize(
+    ("walls", "told"),
+    [
+        pytest.param([100.0, 101.0, 102.0], [0, 0], id="it goes"),
+        pytest.param([100.0, 101.0, 3702.0], [0, 0], id="it is set forward"),
+        pytest.param([100.0, 101.0, -3498.0], [0, 3600], id="it is set back"),
+        pytest.param([100.0, 3701.0, 102.0], [0, 3600], id="forward, and back again"),
+        pytest.param([100.0, 101.0, 101.0], [0, 0], id="a second"),
+    ],
+)
+def test_a_clock_that_is_set_back_is_noticed(walls: list[float], told: list[float]) -> None:
+    wall, steady = iter(walls), iter([5.0, 6.0, 7.0])
+    clock = Clock(lambda: next(wall), lambda: next(steady))
+    assert [clock.set_back() for _ in told] == told
+
+
+def test_a_service_is_started_again_though_a_process_of_its_own_holds_its_output_open() -> None:
+    supervisor = Supervisor({"one": [sys.executable, "-c", HOLDS_THE_PIPE]})
+    waiting: list[int] = []
+    try:
+        with in_background(supervisor) as ready:
+            waiting.append(ready["one"]["waits"])
+            child = supervisor.children["one"]
+            assert child.process is not None
+            os.kill(child.process.pid, signal.SIGKILL)
+            killed = time.monotonic()
+            peers.wait_until(lambda: child.restarts == 1 and child.ready is not None, "its next life")
+            waiting.append(child.ready["waits"])  # type: ignore[index]
+            assert time.monotonic() - killed < 20.0, "and the one that waits would wait for ever"
+            os.kill(waiting[0], 0)
+    finally:
+        for pid in waiting:
+            os.kill(pid, signal.SIGKILL)
