@@ -10,11 +10,9 @@ slow one nobody else's trouble; it skips pictures, because it takes the newest o
 
 from __future__ import annotations
 
-import logging
 import re
 import select
 import socket
-import sys
 from collections.abc import Callable
 from http import HTTPStatus
 from ipaddress import ip_address
@@ -41,8 +39,6 @@ STRICT = (
     ("Content-Security-Policy", "default-src 'none'"),
     ("Referrer-Policy", "no-referrer"),
 )
-
-log = logging.getLogger(__name__)
 
 
 class Proxy(Doors):
@@ -104,11 +100,6 @@ class Proxy(Doors):
             super().process_request_thread(request, client_address)
         finally:
             self._entrances.pop(request).release()
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A viewer that went away is none of our concern; anything else is a bug, and told."""
-        if not isinstance(sys.exception(), OSError):
-            log.exception("a viewer at %s could not be served", client_address[0])
 
     def close(self) -> None:
         """Ends the port and every viewer."""
