@@ -1,11 +1,11 @@
 """A smart apartment, its camera and a robot on one MQTT event bus.
 
-    topics, payloads, states   what travels on the bus
+    topics/, payloads/, states what travels on the bus
     bus/                       the bus itself
-    home, config               what people configure
+    apartment/, config         what people configure
     runner, supervisor         how a service lives
     camera/, vision/           the camera and its pictures
-    bridge/                    ROS 1
+    bridge/, ros/              ROS 1
     persistence/, storage/     what is kept
     simulators/                a home and a camera that are not there
     peers/                     private brokers, databases and ROS masters for demo, tests and benchmarks

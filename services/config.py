@@ -18,9 +18,9 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, Field, SecretStr, ValidationError
 
 from services import document, secret_store
+from services.apartment.home import Home
 from services.document import Document, Path_
 from services.errors import ConfigError
-from services.home import Home
 from services.registry import REGISTRY, Row
 from services.section import Section
 from services.topic import LEVELS

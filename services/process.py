@@ -29,6 +29,7 @@ from services.bus import WAKE_TOPIC, Message
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.config import Apartment, BusSettings, Instance, Tls
+from services.memory import few_arenas
 from services.runner import Runner
 from services.steering import Steered
 from services.topics import SERVICE_STATUS
@@ -39,7 +40,6 @@ log = logging.getLogger(__name__)
 LONGEST_WAIT_S = 1.0
 CLOCK_BACK_S = 2.0  # a clock that is set back further ends a service, to be started again
 SIGNAL_S = 0.2  # a signal that comes while Python is about to wait is seen at the end of the wait only
-ARENAS = 2  # of glibc's memory: many threads that wait would take many times what one needs
 SUPERVISED = "APARTMENT_SUPERVISED"  # set by the supervisor: end when it ends
 Ready = Callable[[dict[str, Any]], None]
 OneReady = Callable[[str, dict[str, Any]], None]
@@ -97,7 +97,7 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
     """
     if os.environ.get(SUPERVISED):
         _end_with_parent()
-    _few_arenas()
+    few_arenas()
     faulthandler.register(signal.SIGUSR1)  # what every thread is doing, for whoever finds a service that hangs
     addresses: dict[str, Any] = {}
 
@@ -140,6 +140,7 @@ def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event,
             name,
             protocol=row.protocol,
             durable=row.durable,
+            inline=row.inline,
         ),
         birth=SERVICE_STATUS.message("online", service=name),
         will=SERVICE_STATUS.message("offline", service=name),
@@ -218,13 +219,6 @@ def _end_with_parent() -> None:
     ctypes.CDLL(None, use_errno=True).prctl(pr_set_pdeathsig, signal.SIGTERM)
     if os.getppid() != int(os.environ[SUPERVISED]):
         os.kill(os.getpid(), signal.SIGTERM)  # it died before we asked
-
-
-def _few_arenas() -> None:
-    """For this process, and for those that it starts (mallopt(3), M_ARENA_MAX); a C library without it needs none."""
-    m_arena_max = -8
-    if hasattr(library := ctypes.CDLL(None), "mallopt"):
-        library.mallopt(m_arena_max, int(os.environ.setdefault("MALLOC_ARENA_MAX", str(ARENAS))))
 
 
 def ready_line(name: str, addresses: dict[str, Any]) -> str:

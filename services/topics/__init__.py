@@ -2,7 +2,7 @@
 
 `bus_topics.md`, the broker's ACL and every read and publish come from this table; nothing else spells a topic. The rows
 stand in the modules beside, by whose they are. What a row is stands in `services/topic.py`, the payload models in
-`services/payloads.py`, OpenHAB's string forms in `services/states.py`.
+`services/payloads/`, OpenHAB's string forms in `services/states.py`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services import history_payloads as p
+from services.payloads import history as p
 from services.topic import Kind, Topic
 from services.topics.roles import SHOWN, STEERS
 

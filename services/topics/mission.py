@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services import robot_payloads as r
+from services.payloads import robot as r
 from services.topic import Kind, Topic
 from services.topics.roles import SHOWN
 

@@ -16,7 +16,7 @@ def markdown(rows: Iterable[Topic] = TABLE) -> str:
         "Written by `apartment topics --write` from `services/topics/`; a test keeps them equal. Kinds: **state**",
         "(retained, QoS 1), **event** and **command** (not retained, QoS 1; a retained command, or one older than",
         f"{STALE_AFTER_S:.0f} s, is refused), **blob** (QoS 0). Payloads that are not text are the models of",
-        "`services/payloads.py`, `robot_payloads.py` and `history_payloads.py`.",
+        "`services/payloads/`.",
         "",
         "| Topic | Kind | Payload | Stored | Written by | Read by | Meaning |",
         "| --- | --- | --- | --- | --- | --- | --- |",

@@ -1,4 +1,4 @@
-"""What travels between those who want a marker found, the mission, and a robot. The other payloads: `payloads.py`.
+"""What travels between those who want a marker found, the mission, and a robot. The others: the package itself.
 
 Poses of robots are in the map frame (metres, `yaw_deg` counter-clockwise from its x); where a marker is, is said in
 the apartment frame, as everywhere on the bus.

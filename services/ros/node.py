@@ -1,6 +1,6 @@
 """rospy without its side effects on whoever starts a node: Python's logging stays as it was, registrations are ours.
 
-Not here: talking to the master (`ros_master.py`), what the bridge's node does (`bridge/ros.py`).
+Not here: talking to the master (`master.py`), what the bridge's node does (`bridge/ros.py`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from services.ros_master import Registrations
+from services.ros.master import Registrations
 
 
 def rospy() -> Any:

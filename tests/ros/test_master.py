@@ -12,10 +12,10 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
-from services import ros_master as master_module
 from services.errors import Unavailable
 from services.peers import free_port
-from services.ros_master import Master, Registrations, register
+from services.ros import master as master_module
+from services.ros.master import Master, Registrations, register
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What travels on `history/#`: a question about what was stored, and its answer. The other payloads: `payloads.py`."""
+"""What travels on `history/#`: a question about what was stored, and its answer. The others: the package itself."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from services.payloads import Payload
-from services.robot_payloads import MissionResult
+from services.payloads.robot import MissionResult
 
 
 class HistoryGet(Payload):

@@ -9,11 +9,11 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from services.home import Home, Item, Range
+from services.apartment.home import Home, Item, Range
 from services.simulators.devices import first_state
 from services.states import check_state
 
-EXAMPLE = Path(__file__).parent.parent / "config" / "home.yaml"
+EXAMPLE = Path(__file__).parents[2] / "config" / "home.yaml"
 
 
 @pytest.fixture(scope="module")

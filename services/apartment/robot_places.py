@@ -12,9 +12,10 @@ from pathlib import Path
 
 from pydantic import Field, ValidationError
 
-from services import document, floor
+from services import document
+from services.apartment import floor
+from services.apartment.floor import XY, Grid
 from services.errors import ConfigError
-from services.floor import XY, Grid
 from services.section import Section
 
 PLACE, ANGLE = 4, 3  # decimals of what is written: a tenth of a millimetre, a thousandth of a degree
