@@ -23,9 +23,11 @@ from services.topics import CAMERA_ORDER, CAMERA_ORDER_RESULT, read
 class Client:
     """Waits on a bus from the caller's thread. What came while it waited for something else is kept in `seen`."""
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, came: Sequence[Message] = ()) -> None:
+        """`came`: what has come already; the first `pump` gives it."""
         self.bus = bus
         self.seen: list[Message] = []
+        self._came = list(came)
 
     def subscribe(self, *filters: str) -> None:
         """Asks for everything that matches any of the filters."""
@@ -41,7 +43,7 @@ class Client:
 
     def pump(self, timeout_s: float = 0.0) -> list[Message]:
         """What has come since the last call; waits for the first up to `timeout_s`."""
-        came = self.bus.receive(timeout_s)
+        came, self._came = self._came or self.bus.receive(timeout_s), []
         self.bus.ack(came)
         self.seen.extend(came)
         return came
@@ -121,8 +123,6 @@ def connected(
             if time.monotonic() > end:
                 raise TimeoutError(f"no broker answers at {settings.host}:{settings.port}")
             waiting += bus.receive(0.05)
-        client = Client(bus)
-        client.seen += [message._replace(token=None) for message in waiting]
-        yield client
+        yield Client(bus, waiting)
     finally:
         bus.close()

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from services import process
+from services.apartment.home import Home
 from services.bus import Message
 from services.config import Apartment, BusSettings, Instance
-from services.home import Home
 from services.registry import Row
 from services.runner import Post
 from services.section import Section

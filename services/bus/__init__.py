@@ -71,7 +71,7 @@ class Bus(Protocol):
         """Asks for everything that matches; restored after every reconnect. `/bus/lost` is the bus's own word."""
 
     def publish(self, message: Message) -> None:
-        """Sends without waiting."""
+        """Sends without waiting, at the latest in the next `receive`."""
 
     def post(self, message: Message) -> None:
         """Puts a local message (topic begins with `/`) into the inbox, from any thread."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 import ssl
-import threading
+from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -12,9 +12,10 @@ import paho.mqtt.client as paho
 from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
 
 from services.bus import Message
-from services.bus.network import Client
+from services.bus.network import Client, Network
 
 Protocol = Literal[4, 5]
 WINDOW = 1000  # messages in a turn, and in flight from the broker (its max_inflight_messages is the same)
@@ -35,6 +36,7 @@ class Address:
     protocol: Protocol = 5
     keepalive_s: int = 15
     durable: bool = False  # the broker keeps our messages while we are away
+    inline: bool = False  # the service's own thread reads and writes: no change of threads, and no long turns
 
 
 def client(address: Address, protocol: Protocol, will: Message | None = None, client_id: str = "") -> Client:
@@ -70,23 +72,23 @@ def negotiate(address: Address) -> Protocol:
 
     A broker that does not (amqtt) cannot skip the properties and the will of a full one, and would never answer.
     """
-    answered = threading.Event()
-    spoken: list[Protocol] = [5]
-
-    def on_connect(_client: paho.Client, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
-        spoken[0] = 4 if reason == "Unsupported protocol version" else 5
-        answered.set()
-
     asking = client(address, 5, client_id=f"{address.client_id}-asks")
-    asking.on_connect = on_connect
     asking.connect(address.host, address.port, address.keepalive_s)
-    asking.loop_start()
-    heard = answered.wait(CONNECT_TIMEOUT_S)
-    asking.disconnect()
-    asking.loop_stop()
-    if not heard:
+    reason = answer(asking)
+    if reason is None:
         raise OSError("the broker does not answer CONNECT")
-    return spoken[0]
+    return 4 if reason == "Unsupported protocol version" else 5
+
+
+def answer(asking: Client) -> ReasonCode | None:
+    """What the broker says to the CONNECT that was sent, None when it says nothing; the connection ends with it."""
+    said: list[ReasonCode] = []
+    asking.on_connect = lambda _client, _data, _flags, reason, _properties: said.append(reason)
+    with closing(Network()) as network:
+        network.run(lambda: asking, lambda: not said and asking.socket() is not None, CONNECT_TIMEOUT_S)
+    asking.disconnect()
+    asking.write()
+    return said[0] if said else None
 
 
 def properties(message: Message, protocol: Protocol) -> Properties | None:

@@ -2,7 +2,8 @@
 
 Every connection is a fresh paho client: what was in flight on the old one is not resent by paho behind our back,
 so no command arrives late; the outbox decides what is said again. Two threads: the service's own, which calls
-every method here; the keeper, which connects again and again, fills the inbox and writes (`network.py`).
+every method here; the keeper, which connects again and again. The keeper also reads into the inbox and writes
+(`network.py`), so that a long turn holds up neither; with `Address.inline` the service's own does, in `receive`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
-import paho.mqtt.client as paho
 from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.reasoncodes import ReasonCode
 
@@ -33,6 +33,7 @@ GATHER_S = 0.002  # in a flood the next ones are left to gather so long
 INBOX = 20_000  # waiting messages, beyond which those of QoS 0 are dropped
 RETRY_S = (0.1, 1.0)  # between attempts to connect: first, longest; a restarted broker is met again within 2 s
 FAREWELL_S = 2.0
+LOOK_S = 0.01  # between two looks whether the last words are said
 WAKE = Message(WAKE_TOPIC)
 
 
@@ -59,8 +60,9 @@ class MqttBus:
         self._acknowledged: deque[int] = deque()
         self._sessions: deque[bool] = deque(maxlen=1)  # whether the broker had kept ours; until it is told
         self._to_acknowledge: deque[Delivery] = deque()
-        self._client: paho.Client | None = None
+        self._client: Client | None = None  # of the connection that stands
         self._network = Network()
+        self._link: Client | None = None  # of the connection that is being made, or stands
         self._up = 0  # the number of the connection that stands; set by the keeper's thread
         self._greeted = 0  # the one on which the outbox has spoken; set by the service's thread
         self._closing = threading.Event()
@@ -87,7 +89,8 @@ class MqttBus:
         """See `Bus`."""
         self._filters = (*self._filters, *filters)
         if self._up and self._client is not None:
-            self._subscribe(self._client, filters)
+            self._client.ask_for(filters)
+            self._network.wake()
             self._tell_of_session()
 
     def publish(self, message: Message) -> None:
@@ -97,15 +100,20 @@ class MqttBus:
     def post(self, message: Message) -> None:
         """See `Bus`."""
         self._inbox.put(message._replace(received=self._clock()))
+        if self.address.inline:
+            self._network.wake()
 
     def receive(self, timeout: float | None = 0.0, most: int = WINDOW) -> list[Message]:
         """See `Bus`."""
         self._keep_up()
+        if self.address.inline:
+            self._go_on(timeout, lambda: most == 0 or self._inbox.empty())
+            timeout = 0.0
+        elif self._busy and most:
+            time.sleep(GATHER_S)
         if not most:
             self._closing.wait(timeout)
             return []
-        if self._busy:
-            time.sleep(GATHER_S)
         get, taken = self._inbox.get_nowait, []
         try:
             taken.append(self._inbox.get(timeout=timeout) if timeout != 0.0 else get())
@@ -128,12 +136,14 @@ class MqttBus:
         client, was_connected = self._client, self.connected
         self._outbox.close(self._will, connected=was_connected)
         if client is not None and was_connected:
-            self._wait_for_the_last_words()
+            self._go_on(FAREWELL_S, self._has_last_words)
             client.disconnect()
-            self._lost.wait(FAREWELL_S)
+            self._network.wake()
+            self._go_on(FAREWELL_S, lambda: not self._lost.is_set())
         self._lost.set()
         self._network.wake()
         self._keeper.join(CONNECT_TIMEOUT_S + 1.0)
+        self._network.close()
 
     # -- the service's thread, inside
 
@@ -167,6 +177,7 @@ class MqttBus:
             return False
         properties = connection.properties(message, self._protocol)
         info = client.publish(message.topic, message.payload, message.qos, message.retain, properties)
+        self._network.wake()
         no_connection = info.rc == MQTTErrorCode.MQTT_ERR_NO_CONN
         if info.rc == MQTTErrorCode.MQTT_ERR_QUEUE_SIZE or (no_connection and message.qos == 0):
             return False
@@ -178,14 +189,30 @@ class MqttBus:
         while self._acknowledged:
             self._in_flight.pop(self._acknowledged.popleft(), None)
 
-    def _wait_for_the_last_words(self) -> None:
-        """Until the broker has acknowledged what we said, or FAREWELL_S."""
+    def _has_last_words(self) -> bool:
+        """Whether something that we said is not written, or not acknowledged."""
+        self._forget_acknowledged()
         client = self._client
-        end = time.monotonic() + FAREWELL_S
-        while client is not None and client.want_write() and time.monotonic() < end:
-            self._lost.wait(0.01)
-        while self._in_flight and time.monotonic() < end and not self._lost.wait(0.01):
-            self._forget_acknowledged()
+        return client is not None and (client.want_write() or bool(self._in_flight)) and not self._lost.is_set()
+
+    def _go_on(self, timeout: float | None, wanted: Callable[[], bool]) -> None:
+        """Lets the network do its work while that is wanted, in this thread where that is ours to do."""
+        if self.address.inline:
+            self._network.run(self._prepare, wanted, timeout)
+            return
+        end = time.monotonic() + (timeout or 0.0)
+        while wanted() and time.monotonic() < end:
+            self._lost.wait(LOOK_S)
+
+    # -- the thread that reads and writes
+
+    def _prepare(self) -> Client | None:
+        """Hands over the acknowledgements; what came by an older connection is left out."""
+        client, done = self._client, self._to_acknowledge
+        packets = [token.packet for _ in range(len(done)) if (token := done.popleft()).connection == self._up]
+        if packets and client is not None:
+            client.ack_all(packets)
+        return self._link
 
     # -- the keeper's thread
 
@@ -197,7 +224,6 @@ class MqttBus:
             self._one_connection()
             pause = RETRY_S[0] if self.connections > before else min(pause * 2, RETRY_S[1])
             self._closing.wait(pause * random.uniform(0.8, 1.2))
-        self._network.close()
 
     def _one_connection(self) -> None:
         try:
@@ -208,29 +234,24 @@ class MqttBus:
         except (OSError, ValueError) as error:
             self._tell(f"no connection to {self.address.host}:{self.address.port}: {error}")
             return
-        self._network.run(client, self._lost, lambda: self._acknowledge(client))
-        self._up = 0
-        self._let_go(client)
-
-    def _let_go(self, client: Client) -> None:
-        """Its sockets are closed when nobody holds it any more; in a circle with us that would be left to chance."""
-        client.on_connect = client.on_disconnect = client.on_message = client.on_publish = None
-        if self._client is client:
-            self._client = None
-
-    def _acknowledge(self, client: Client) -> None:
-        """What the service has done with; what came by an older connection is left out."""
-        done = self._to_acknowledge
-        packets = [token.packet for _ in range(len(done)) if (token := done.popleft()).connection == self._up]
-        if packets:
-            client.ack_all(packets)
+        if self._closing.is_set():
+            return
+        self._link = client
+        if self.address.inline:
+            self._network.wake()
+            self._lost.wait()
+        else:
+            self._network.run(self._prepare, lambda: not self._lost.is_set() and client.socket() is not None)
+        self._up, self._client, self._link = 0, None, None
+        client.forget()
 
     def _new_client(self) -> Client:
         client = connection.client(self.address, self._protocol, self._will)
-        client.on_connect = self._on_connect
-        client.on_disconnect = self._on_disconnect
-        client.on_message = self._on_message
-        client.on_publish = self._on_publish
+        client.on_connect = self._on_connect  # type: ignore[assignment]
+        client.clock = self._clock
+        client.on_disconnect = self._on_disconnect  # type: ignore[assignment]
+        client.on_came = self._on_came
+        client.on_acknowledged = self._acknowledged.append
         return client
 
     def _tell(self, text: str) -> None:
@@ -239,9 +260,9 @@ class MqttBus:
             log.warning("%s", text)
             self._told = text
 
-    # -- the same thread, called by paho
+    # -- the thread that reads and writes, called by paho
 
-    def _on_connect(self, client: paho.Client, _data: Any, flags: Any, reason: ReasonCode, _properties: Any) -> None:
+    def _on_connect(self, client: Client, _data: Any, flags: Any, reason: ReasonCode, _properties: Any) -> None:
         if reason.is_failure:
             self._tell(f"the broker refuses {self.address.client_id}: {reason}")
             self._lost.set()
@@ -251,21 +272,14 @@ class MqttBus:
             self._told = ""
         self._client = client
         self._acknowledged.clear()
-        self.connections += 1
+        self.connections = client.number = self.connections + 1
         self._up = self.connections  # before the filters are read: what is asked for meanwhile sees that it is up
-        self._subscribe(client, self._filters)
+        client.ask_for(self._filters)
         self._sessions.append(bool(flags.session_present))
         self._tell_of_session()
         self._inbox.put(WAKE)
 
-    def _subscribe(self, client: paho.Client, filters: Sequence[str]) -> None:
-        wanted = [(one, 1) for one in filters if not one.startswith("/")]
-        if wanted:
-            client.subscribe(wanted)
-
-    def _on_disconnect(
-        self, client: paho.Client, _data: Any, _flags: Any, reason: ReasonCode, _properties: Any
-    ) -> None:
+    def _on_disconnect(self, client: Client, _data: Any, _flags: Any, reason: ReasonCode, _properties: Any) -> None:
         was_up, self._up = self._up, 0
         if self._client is client and not self._closing.is_set():
             self._tell(f"connection to {self.address.host}:{self.address.port} lost: {reason}")
@@ -273,23 +287,12 @@ class MqttBus:
                 self.post(Message(LOST_TOPIC))
         self._lost.set()
 
-    def _on_message(self, _client: paho.Client, _data: Any, message: paho.MQTTMessage) -> None:
-        self._network.messages += 1
-        try:
-            topic = message.topic
-        except UnicodeDecodeError:  # a broker must refuse it (MQTT 5, 1.5.4); it would end this thread
-            return
-        if message.retain and not any(topic_matches(wanted, topic) for wanted in self._filters):
-            return  # amqtt 0.12 hands out retained messages that nobody asked for
+    def _on_came(self, message: Message) -> None:
+        if message.retain and not any(topic_matches(wanted, message.topic) for wanted in self._filters):
+            if message.qos and message.token is not None:
+                self._to_acknowledge.append(message.token)
+            return  # amqtt 0.12 hands out retained messages that nobody asked for, and waits for their acknowledgement
         if message.qos == 0 and self._inbox.qsize() > INBOX:  # QoS 1 is held back by the window instead
             self._overrun += 1
             return
-        token = Delivery(self.connections, message.mid, message.dup)
-        came = Message(topic, bytes(message.payload), message.retain, message.qos, self._clock(), token=token)
-        asked = message.properties
-        if asked is not None and hasattr(asked, "ResponseTopic"):
-            came = came._replace(reply_to=asked.ResponseTopic, correlation=getattr(asked, "CorrelationData", None))
-        self._inbox.put(came)
-
-    def _on_publish(self, _client: paho.Client, _data: Any, mid: int, _reason: Any, _properties: Any) -> None:
-        self._acknowledged.append(mid)
+        self._inbox.put(message)

@@ -2,6 +2,10 @@
 
 It runs in a process of its own, so that its work does not slow the caller's. It speaks MQTT 3.1.1 only, keeps
 nothing over a restart and has no accounts: loopback only. Not here: the real one, `peers/mosquitto.py`.
+
+amqtt 0.12.1 walks through its table of subscriptions and waits on the way. Who subscribes meanwhile ends the walk with
+a RuntimeError that it tells nobody: the client that was greeted by it is connected and neither heard nor spoken to for
+ever, or nobody is told anything any more. So the table that it gets here is walked through as it was at the beginning.
 """
 
 from __future__ import annotations
@@ -31,6 +35,17 @@ def broker(port: int = 0) -> Iterator[int]:
         yield port
 
 
+class Table(dict[str, Any]):
+    """Whoever walks through it sees it as it was when the walk began."""
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(list(super().__iter__()))
+
+    def items(self) -> Any:
+        """See `dict`."""
+        return dict(super().items()).items()
+
+
 async def _serve(port: int) -> None:
     from amqtt.broker import Broker
 
@@ -42,6 +57,7 @@ async def _serve(port: int) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stopping.set)
     server = Broker(_settings(port))
+    server._subscriptions = Table()
     await server.start()
     await stopping.wait()
     await server.shutdown()
