@@ -1,7 +1,7 @@
 """Where the apartment lies in a robot's map, from points that are known in both: a turn and a shift in the plane.
 
 Points come in pairs, metres, each from a tape, a map viewer, or what robot and house both see; here is what they tell,
-how well, and which of them cannot be right. Where the answer is kept: `services/robot_places.py`.
+how well, and which of them cannot be right. Where the answer is kept: `services/apartment/robot_places.py`.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import asin, atan2, degrees
+from math import asin, atan2, degrees, sqrt
 
 import cv2
 import numpy as np
@@ -115,7 +115,7 @@ def _problem(
         tuple(look for look, _ in kept),
         ids,
         np.array([known[marker].position for marker in ids], float),
-        np.array([known[marker].doubt_m for marker in ids], float),
+        np.array([known[marker].doubt_m for marker in ids], float) / sqrt(3),
         np.array([known[marker].size_m for marker in ids], float),
         guess,
         angle_deg,

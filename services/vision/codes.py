@@ -22,6 +22,7 @@ DICTIONARIES = tuple(sorted(name for name in dir(cv2.aruco) if name.startswith("
 FINE = 8  # samples to a cell in which a blur is reckoned
 SPOT = 0.5  # of a cell's side: the part whose mean grey is taken
 BLURS = (0.0, 0.35, 0.55)  # standard deviations in cells that codes are matched at
+CLIPPED = 0.5  # of the largest step: more is not believed to be the code's
 GRAIN = 4  # samples to a cell where a whole square is compared
 SHARPNESS = (0.15, 0.3, 0.45, 0.6)  # standard deviations in cells that whole squares are compared at
 
@@ -30,14 +31,15 @@ SHARPNESS = (0.15, 0.3, 0.45, 0.6)  # standard deviations in cells that whole sq
 class Book:
     """A dictionary: row k * ids + id of `codes` holds its cells (0, 1) turned clockwise k times.
 
-    `seen` are the same with mean 0 and length 1, once for each blur. `edges` counts, for each row, the neighbouring
-    cells that differ, the border's included: few make a figure that ordinary pictures hold too. `stripes`: whether all
-    of a row's lines of cells are alike, along or across.
+    `seen` are the same with mean 0 and length 1, once for each blur, and `steps` what `steps` makes of them. `edges`
+    counts, for each row, the neighbouring cells that differ, the border's included: few make a figure that ordinary
+    pictures hold too. `stripes`: whether all of a row's lines of cells are alike, along or across.
     """
 
     inner: int  # cells on a side without the border
     codes: Rows
     seen: tuple[Rows, ...]
+    steps: Rows
     edges: NDArray[np.intp]
     stripes: NDArray[np.bool_]
 
@@ -71,7 +73,7 @@ def book(dictionary: str) -> Book:
     edges = (whole[:, 1:] != whole[:, :-1]).sum(axis=(1, 2)) + (whole[:, :, 1:] != whole[:, :, :-1]).sum(axis=(1, 2))
     cells = codes.reshape(-1, inner, inner)
     stripes = (cells == cells[:, :1]).all(axis=(1, 2)) | (cells == cells[:, :, :1]).all(axis=(1, 2))
-    return Book(inner, codes, seen, np.asarray(edges, np.intp), stripes)
+    return Book(inner, codes, seen, steps(codes, inner), np.asarray(edges, np.intp), stripes)
 
 
 def predefined(dictionary: str) -> Any:
@@ -85,6 +87,20 @@ def normalised(rows: NDArray[Any]) -> NDArray[Any]:
     """Each row with mean 0 and length 1; a flat one is all 0."""
     centred = rows - rows.mean(axis=1, keepdims=True)
     return np.asarray(centred / np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), 1e-6))
+
+
+def steps(cells: NDArray[Any], size: int) -> Rows:
+    """From each cell to the next, along and across, of cells (n, size * size): clipped, and each row of length 1.
+
+    In whatever light: it takes hardly anything from the steps, and its own are clipped.
+    """
+    square = cells.reshape(-1, size, size)
+    found = np.concatenate(
+        [np.diff(square, axis=axis).reshape(len(square), size * (size - 1)) for axis in (1, 2)], axis=1
+    )
+    most = CLIPPED * np.abs(found).max(axis=1, keepdims=True)
+    found = np.clip(found, -most, most)
+    return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-6), np.float32)
 
 
 def grid(inner: Rows, size: int) -> NDArray[np.float32]:

@@ -2,7 +2,8 @@
 
 Dark squares are looked for (`squares`), in the picture and in smaller ones made of it, their corners made exact
 (`corners`) and their cells matched with every code of the whole dictionary (`reading`, `codes`). The best code wins,
-and only if it is wanted: a neighbour in the dictionary is never taken for the target. Who is believed is `belief`'s.
+and only if it is wanted: a neighbour in the dictionary is never taken for the target. What lies half in a shadow is
+read once more as if in one light (`shadow`). Who is believed is `belief`'s.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from numpy.typing import NDArray
 from services.vision import belief, codes, reading
 from services.vision.codes import DICTIONARIES, Book
 from services.vision.corners import refine, refine_many
-from services.vision.squares import noise, squares
+from services.vision.looks import Look, around, halved, longest, near
+from services.vision.shadow import CHANGE, lit
+from services.vision.squares import squares, squares_at_levels
 
 __all__ = ["DICTIONARIES", "Detection", "detect"]
 
@@ -26,8 +29,6 @@ Picture = NDArray[np.uint8]
 
 SMALLEST_PX = 10.0  # side of the squares looked for; below 12 or so nothing can be decoded
 SMALLEST_HALVED_PX = 16.0  # the same in a picture that was shrunk: smaller ones are in the one before
-LEAST_PICTURE_PX = 110  # a picture with a shorter side than twice this is not shrunk
-MOST_HALVINGS = 4
 WIDE_WINDOW = 15  # px, in a picture that was shrunk: the border of a blurred marker, or one amid texture
 OTHER_WINDOWS = (3, 23)  # px: a shadow's edge needs a narrow one
 PART_WINDOWS = (9, 23)  # px, in an enlarged part
@@ -35,6 +36,11 @@ ENLARGED_PX = 80.0  # a doubtful square's side is enlarged to about this, if it 
 FAINT = 2.0  # grey levels: the threshold's step in an enlarged part
 HOPEFUL = 4.0  # belief of a square that is worth another look
 MOST_DOUBTFUL = 8  # of them
+LEVELS, LEVELS_PX = 5, 700  # grey levels that are thresholds too, in a picture of at most so many pixels a side
+RIMMED, RIM = 0.85, (3.0, 2.0)  # share of a square's outline with paper beside it, lighter by grey levels, noises
+LIKELY = 0.75  # likeness to a code, in whatever light, of a square that is worth to be seen in one light
+MOST_LIKELY = 5  # of them
+SURE = 30.0  # belief of a marker that needs no other light
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +70,9 @@ def detect(image: Picture, dictionary: str, targets: Collection[int] | None = No
     search.add(search.first())
     if search.worth_more():
         search.add(search.closer())
+    if wanted is None or not search.found():
+        search.add(search.levels())
+        search.add(search.in_one_light())
     return search.found()
 
 
@@ -82,27 +91,10 @@ def _grey(image: Picture) -> Picture:
 
 
 @dataclass(frozen=True, eq=False)
-class _Look:
-    """A picture to look at: the given one `scale` times as large."""
-
-    grey: Picture
-    scale: float
-    noise: float
-
-    def back(self, points: Array) -> Array:
-        """From this picture's pixels to the given one's."""
-        return (points + 0.5) / self.scale - 0.5
-
-    def here(self, points: Array) -> Array:
-        """The other way round."""
-        return (points + 0.5) * self.scale - 0.5
-
-
-@dataclass(frozen=True, eq=False)
 class _Candidate:
     """A square with what could be read in it; corners in the given picture's pixels, from the code's top-left."""
 
-    look: _Look
+    look: Look
     corners: Array
     marker: int
     belief: float
@@ -117,11 +109,13 @@ class _Search:
         self.book = codes.book(dictionary)
         self.wanted = wanted
         self.likely = self.book.rows(self.book.seen[1], wanted)
-        self.looks = list(_halved(grey))
+        self.steps = self.book.rows(self.book.steps, wanted)
+        self.looks = list(halved(grey))
         self.candidates: list[_Candidate] = []
         self.believed: list[_Candidate] = []
+        self.shaded: list[tuple[float, Look, Array]] = []
 
-    def first(self) -> Iterator[tuple[_Look, Array]]:
+    def first(self) -> Iterator[tuple[Look, Array]]:
         """The picture and smaller ones: each with its rough squares."""
         for look in self.looks:
             whole = look.scale == 1
@@ -129,19 +123,50 @@ class _Search:
             if not whole:
                 yield look, squares(look.grey, SMALLEST_HALVED_PX, window=WIDE_WINDOW)
 
-    def closer(self) -> Iterator[tuple[_Look, Array]]:
+    def closer(self) -> Iterator[tuple[Look, Array]]:
         """Slower looks where something may be: enlarged, with other windows; everywhere if there is nothing at all."""
         for one in self._doubtful()[:MOST_DOUBTFUL]:
-            part, corner = _part(self.looks[0].grey, one.corners)
-            larger = float(np.clip(ENLARGED_PX / _longest(one.corners), 1.0, 3.0))
+            part, corner = around(self.looks[0].grey, one.corners)
+            larger = float(np.clip(ENLARGED_PX / longest(one.corners), 1.0, 3.0))
             grey = cv2.resize(part, None, fx=larger, fy=larger, interpolation=cv2.INTER_CUBIC)
-            look = _Look(np.asarray(grey, np.uint8), larger, self.looks[0].noise)
+            look = Look(np.asarray(grey, np.uint8), larger, self.looks[0].noise)
             for window in PART_WINDOWS:
                 found = squares(look.grey, larger * SMALLEST_PX, window=window, step=FAINT)
                 yield self.looks[0], look.back(found) + corner
         if self.wanted is None and not self.believed:
             for window in OTHER_WINDOWS:
                 yield self.looks[0], squares(self.looks[0].grey, SMALLEST_PX, window=window)
+
+    def levels(self) -> Iterator[tuple[Look, Array]]:
+        """The squares that a shadow's edge tears: at levels of grey between the light in the shadow and the dark."""
+        look = next((look for look in self.looks if max(look.grey.shape) <= LEVELS_PX), self.looks[-1])
+        yield look, squares_at_levels(look.grey, SMALLEST_HALVED_PX, LEVELS)
+
+    def in_one_light(self) -> Iterator[tuple[Look, Array]]:
+        """The likeliest squares that lie in light of several kinds, as if in one."""
+        shaded = sorted(self.shaded, key=lambda one: -one[0])
+        there = np.array([look.back(rough) for _, look, rough in shaded]).reshape(-1, 4, 2)
+        left = np.ones(len(shaded), bool)
+        for one in self.believed:
+            left &= (one.belief < SURE) | ~near(there, one.corners)
+        for _ in range(MOST_LIKELY):
+            if not left.any():
+                return
+            index = int(left.argmax())
+            left &= ~near(there, there[index])
+            _, look, rough = shaded[index]
+            exact = refine_many(look.grey, rough[None], self.book.modules)
+            for part, begin in () if np.isnan(exact).any() else lit(look.grey, exact[0], self.book.modules):
+                yield Look(part, look.scale, look.noise, begin), exact - begin
+
+    def _remember(self, look: Look, rough: Array, cells: reading.Cells) -> None:
+        """Those that have paper all around and lie in light of several kinds, if they are like a wanted code."""
+        step = cells.outside - cells.border
+        rimmed = (step > max(RIM[0], RIM[1] * look.noise)).mean(axis=(1, 2)) > RIMMED
+        change = np.maximum(np.ptp(cells.outside, axis=(1, 2)), np.ptp(cells.border, axis=(1, 2)))
+        shaded = np.flatnonzero(rimmed & (change > CHANGE * step.mean(axis=(1, 2))))
+        likely = reading.likely(cells.inner[shaded], self.book.inner, self.steps)
+        self.shaded += [(much, look, rough[at]) for much, at in zip(likely, shaded, strict=True) if much > LIKELY]
 
     def worth_more(self) -> bool:
         """Whether something looks like a marker that could not be read, and is wanted."""
@@ -152,11 +177,15 @@ class _Search:
         doubtful: list[_Candidate] = []
         for one in sorted(self.candidates, key=lambda one: -one.belief):
             asked = self.wanted is None or one.marker in self.wanted
-            if asked and one.belief > HOPEFUL and not any(_near(one, other) for other in (*self.believed, *doubtful)):
+            if (
+                asked
+                and one.belief > HOPEFUL
+                and not any(near(one.corners, other.corners) for other in (*self.believed, *doubtful))
+            ):
                 doubtful.append(one)
         return doubtful
 
-    def add(self, seen: Iterator[tuple[_Look, Array]]) -> None:
+    def add(self, seen: Iterator[tuple[Look, Array]]) -> None:
         """Reads the squares."""
         for look, rough in seen:
             self.candidates += self._read(look, rough)
@@ -165,7 +194,7 @@ class _Search:
         for one in sorted(self.candidates, key=lambda one: -one.belief):
             if one.belief < enough:
                 break
-            if not any(_near(one, other) for other in self.believed) and self._alike(one):
+            if not any(near(one.corners, other.corners) for other in self.believed) and self._alike(one):
                 self.believed.append(one)
 
     def _alike(self, one: _Candidate) -> bool:
@@ -174,10 +203,11 @@ class _Search:
         like = reading.likeness(one.look.grey, one.look.here(one.corners), faces, one.look.noise)
         return like >= belief.LIKENESS
 
-    def _read(self, look: _Look, rough: Array) -> Iterator[_Candidate]:
+    def _read(self, look: Look, rough: Array) -> Iterator[_Candidate]:
         """Reads twice: roughly, to drop nearly all of them, and again with better corners."""
         modules = self.book.modules
         cells = reading.cells(look.grey, rough, modules)
+        self._remember(look, rough, cells)
         maybe = belief.plausible(reading.appearance(cells))
         fits = reading.fits(cells.inner[maybe], self.likely).max(axis=1)
         rough = rough[maybe][fits > belief.FIRST_CORRELATION]
@@ -213,35 +243,3 @@ class _Search:
             corners = corners if np.isnan(here).any() else look.back(here)
         exact = refine(self.looks[0].grey, corners, modules)
         return corners if exact is None else exact
-
-
-def _halved(grey: Picture) -> Iterator[_Look]:
-    scale = 1.0
-    for _ in range(MOST_HALVINGS + 1):
-        yield _Look(grey, scale, noise(grey))
-        if min(grey.shape) < 2 * LEAST_PICTURE_PX:
-            return
-        even = grey[: grey.shape[0] // 2 * 2, : grey.shape[1] // 2 * 2]
-        grey, scale = (
-            np.asarray(cv2.resize(even, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8),
-            scale / 2,
-        )
-
-
-def _part(grey: Picture, corners: Array) -> tuple[Picture, Array]:
-    """The picture around a square, half as much again on each side, and where it begins."""
-    reach = _longest(corners) / 2
-    height, width = grey.shape
-    start = np.clip(np.floor(corners.min(axis=0) - reach), 0, (width - 1, height - 1)).astype(int)
-    end = np.ceil(corners.max(axis=0) + reach).astype(int) + 1
-    return np.ascontiguousarray(grey[start[1] : end[1], start[0] : end[0]]), start.astype(float)
-
-
-def _longest(corners: Array) -> float:
-    return float(np.linalg.norm(np.roll(corners, 1, axis=0) - corners, axis=1).max())
-
-
-def _near(one: _Candidate, other: _Candidate) -> bool:
-    """Whether the middle of either square lies within half the other's side of its middle."""
-    apart = np.linalg.norm(one.corners.mean(axis=0) - other.corners.mean(axis=0))
-    return bool(apart < max(_longest(one.corners), _longest(other.corners)) / 2)

@@ -45,7 +45,10 @@ class Look:
 
 @dataclass(frozen=True)
 class Known:
-    """Where a marker's centre was put (m, apartment), the side of its black square, and how well it was measured."""
+    """Where a marker's centre was put (m, apartment), the side of its black square, and how well that was measured.
+
+    `doubt_m` is how far from there it mostly is: the root mean square of the distance, in whatever direction.
+    """
 
     position: tuple[float, float, float]
     size_m: float
@@ -59,7 +62,7 @@ class Problem:
     looks: tuple[Look, ...]
     ids: list[int]
     said: Array  # (m, 3)
-    doubt: Array  # (m,)
+    doubt: Array  # (m,) of each coordinate
     sizes: Array  # (m,)
     guess: Mount
     angle_deg: float  # what a reading is off, one standard deviation

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from services.vision import codes
 from services.vision.codes import GRAIN, SPOT, Rows, normalised
 from services.vision.corners import sample
 
@@ -99,9 +100,17 @@ def _outside(grey: Picture, squares: Array, share: Array) -> Array:
     return sample(grey, at[..., 0], at[..., 1])
 
 
+def likely(inner: Array, size: int, rows: Rows) -> Array:
+    """How much cells (n, cells) are like the likeliest code in whatever light: by the steps between them."""
+    return np.asarray(_products(codes.steps(_unshaded(inner), size), rows).max(axis=1), float)
+
+
 def fits(inner: Array, rows: Rows) -> NDArray[np.float32]:
     """How well cells (n, cells) correlate with each row, (n, rows)."""
-    looks = np.asarray(normalised(inner), np.float32)
+    return _products(np.asarray(normalised(inner), np.float32), rows)
+
+
+def _products(looks: Rows, rows: Rows) -> NDArray[np.float32]:
     few = max(1, AT_ONCE // max(1, rows.size))
     return np.concatenate([looks[start : start + few] @ rows.T for start in range(0, max(1, len(looks)), few)])
 

@@ -7,6 +7,7 @@ calibrated from six markers. A part of them is zoomed.
 from __future__ import annotations
 
 import random
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -158,7 +159,8 @@ def kinds(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
 
 def table(outcomes: Sequence[Outcome], refused: Refusals) -> Table:
     """The figures of each kind, beside their bounds."""
-    title = f"where a {SIZE_M} m marker is, 2 to 6 m, K = 8; without a position: {', '.join(refused) or 'none'}"
+    why = ", ".join(f"{count} x {why}" for why, count in Counter(refused).most_common())
+    title = f"where a {SIZE_M} m marker is, 2 to 6 m, K = 8; without a position: {why or 'none'}"
     rows = Table("", "sightings", "median mm", "95 % mm", "bound", "in the 90 % ellipsoid", "orientation sure",
                  "of these flipped", "magnification off", title=title)  # fmt: skip
     for name, ones in kinds(outcomes).items():

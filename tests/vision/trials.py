@@ -130,12 +130,12 @@ def _opencv(dictionary: str) -> Any:
     return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)))
 
 
-def recall(seeds: Sequence[int], *, hard: bool) -> tuple[float, float, int]:
+def recall(seeds: Sequence[int], *, hard: bool, kind: str | None = None) -> tuple[float, float, int]:
     """Share of the markers in so many photographs that we find and that OpenCV finds, and how many we invent."""
     ours = theirs = markers = false = 0
     for seed in seeds:
         dictionary = BOOKS[seed % len(BOOKS)]
-        scene = scenes.photograph(seed, dictionary, 1, hard=hard)
+        scene = scenes.photograph(seed, dictionary, 1, hard=hard, kind=kind)
         (truth,) = scene.markers
         found = [(marker, corners) for marker, corners, _ in detect_any(scene.image, dictionary)]
         ours += hits(found, truth)
