@@ -6,9 +6,9 @@ import json
 
 from services import payloads
 from services.errors import BadMessage
-from services.history_payloads import HistoryGet, HistoryReply
 from services.payloads import Point, stamp
-from services.robot_payloads import MissionEvent, MissionResult
+from services.payloads.history import HistoryGet, HistoryReply
+from services.payloads.robot import MissionEvent, MissionResult
 from services.storage import Item, Mission, Sample, Storage, reading
 
 US = 1_000_000

@@ -19,8 +19,8 @@ from services.errors import BadMessage, ConfigError
 from services.history import answers
 from services.history.plot import HEIGHT, WIDTH, Curve, draw
 from services.history.svg import Svg
-from services.history_payloads import HistoryGet, HistoryReply
 from services.payloads import seconds, stamp
+from services.payloads.history import HistoryGet, HistoryReply
 from services.storage import Address, Item, Mission, Storage, open_ready, reading
 
 UNITS_S = {"s": 1, "m": 60, "h": 3600, "d": 86_400, "w": 604_800}

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 from pydantic import Field, field_validator
 
-from services.home import Home
+from services.apartment.home import Home
 from services.section import Section
 from services.storage import Item, Storage, keeping, reading
 

@@ -16,12 +16,12 @@ from typing import Self
 from pydantic import SecretStr, model_validator
 
 from services import topics
+from services.apartment.home import Home
 from services.bus import Message
 from services.errors import ConfigError, Unavailable
 from services.history import answers, keeping
 from services.history.keeping import Keep
-from services.history_payloads import HistoryGet, HistoryReply
-from services.home import Home
+from services.payloads.history import HistoryGet, HistoryReply
 from services.runner import Post
 from services.section import Section
 from services.storage import Storage, open_ready

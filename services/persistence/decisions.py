@@ -9,7 +9,7 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Set
 
-from services.home import Home
+from services.apartment.home import Home
 from services.persistence import rows, strategies
 from services.persistence.filters import Kept
 from services.persistence.rows import State

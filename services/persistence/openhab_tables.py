@@ -13,8 +13,8 @@ from datetime import UTC, datetime, tzinfo
 from typing import Any
 
 from services import states
+from services.apartment.home import Home
 from services.errors import BadMessage, ConfigError
-from services.home import Home
 from services.persistence import rows
 from services.persistence.rows import State
 from services.storage import Batch, Item, Sample, Storage, reading

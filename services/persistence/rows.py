@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from services import states
+from services.apartment.home import Home
 from services.errors import BadMessage
-from services.home import Home
 from services.payloads import Diagnostic, OrderResult, ScanResult, ScanState, seconds
-from services.robot_payloads import MissionResult, MissionState
+from services.payloads.robot import MissionResult, MissionState
 from services.storage import CameraOrder, Mission, Row, Sample, Scan, Sighting
 from services.storage import Diagnostic as DiagnosticRow
 from services.topics import (

@@ -12,8 +12,8 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from services import document
+from services.apartment.home import Home
 from services.document import Document, Path_
-from services.home import Home
 from services.persistence.cron import Cron
 from services.persistence.filters import Filter
 from services.persistence.strategies import BUILT_IN, Line, Rule, rule

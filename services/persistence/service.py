@@ -16,9 +16,9 @@ from pathlib import Path
 from pydantic import Field
 
 from services import topics
+from services.apartment.home import Home
 from services.bus import SESSION_TOPIC, Message
 from services.errors import BadMessage, ConfigError, Unavailable
-from services.home import Home
 from services.persistence import broker, rows, rulebook, strategies
 from services.persistence.connection import Connection
 from services.persistence.decisions import Decisions
@@ -35,7 +35,7 @@ DIAGNOSTIC_EVERY_S = 1.0
 ABOUT_BROKER = (*broker.FILTERS, SESSION_TOPIC)
 CLOCK_STEP_US = 1_000_000  # a clock that steps back more than this is told
 COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "restored", "reconnects", "redelivered",
-            "broker_dropped", "sessions_lost")  # fmt: skip
+            "deadlocks", "broker_dropped", "sessions_lost")  # fmt: skip
 
 
 class Config(DatabaseSection):
@@ -214,7 +214,9 @@ class Persistence:
     def _commit(self, storage: Storage) -> None:
         if len(self._batch):
             self._batch.seen = self._seen.turn()
+            before = storage.deadlocks
             self.counters["rows"] += self._write(storage, self._batch)
+            self.counters["deadlocks"] += storage.deadlocks - before
             self._seen.committed()
             self.counters["batches"] += 1
             self._batch = Batch()

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from services.home import Home
+from services.apartment.home import Home
 from services.persistence.cron import Cron
 from services.persistence.filters import Filter, Kept
 

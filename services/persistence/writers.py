@@ -14,7 +14,7 @@ from zlib import crc32
 from pydantic import Field, model_validator
 
 from services import topics
-from services.home import Home
+from services.apartment.home import Home
 from services.persistence import strategies
 from services.persistence.rows import State
 from services.persistence.strategies import Line, Rule

@@ -190,6 +190,7 @@ class Storage(Protocol):
     """
 
     dialect: str  # a key of BACKENDS
+    deadlocks: int  # transactions that had to give way to another, and were repeated
 
     @property
     def items(self) -> Mapping[str, Item]:

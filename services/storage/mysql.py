@@ -88,6 +88,7 @@ class MysqlStorage:
         self._address = address
         self._connection = connection
         self._items: dict[str, Item] = {}
+        self.deadlocks = 0
 
     @property
     def items(self) -> dict[str, Item]:
@@ -119,6 +120,7 @@ class MysqlStorage:
             except Unavailable as error:
                 if attempt == DEADLOCK_TRIES or not _is_deadlock(error):
                     raise
+                self.deadlocks += 1
                 time.sleep(random.uniform(*DEADLOCK_PAUSE_S))
         raise AssertionError("the last attempt raises or returns")
 

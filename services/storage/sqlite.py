@@ -15,11 +15,13 @@ from typing import Any
 from services.errors import BadMessage, ConfigError, Unavailable
 from services.storage import FINAL_STATES, TABLES, Address, Batch, Diagnostic, Item, Sample, SeenTurn, Sighting
 from services.storage.migrate import migrate
+from services.storage.sqlite_log import Log
 
 BUSY_S = 5.0
 SETTINGS = (
     "PRAGMA journal_mode=WAL",
     "PRAGMA synchronous=FULL",  # NORMAL can lose what was acknowledged at a power cut
+    "PRAGMA wal_autocheckpoint=0",  # `Log` does it
 )
 UNUSABLE = {"SQLITE_CANTOPEN", "SQLITE_NOTADB", "SQLITE_READONLY", "SQLITE_CORRUPT", "SQLITE_PERM"}
 # Local time as text. The fraction only where there is one: as texts, '08:00:00' comes before '08:00:00.000'.
@@ -75,7 +77,7 @@ def open_address(address: Address) -> SqliteStorage:
     except OSError as error:
         raise ConfigError([f"the database's folder cannot be made: {error}"]) from error
     with _translated(opening=True):
-        storage = SqliteStorage(sqlite3.connect(address.path, timeout=BUSY_S, isolation_level=None))
+        storage = SqliteStorage(address)
         try:
             storage.prepare()
         except BaseException:
@@ -89,16 +91,18 @@ def open_plain(address: Address) -> SqliteStorage:
     if not address.path.is_file():
         raise ConfigError([f"expected a database file, there is no {address.path}"])
     with _translated(opening=True):
-        return SqliteStorage(sqlite3.connect(address.path, timeout=BUSY_S, isolation_level=None))
+        return SqliteStorage(address)
 
 
 class SqliteStorage:
     """See `Storage` for what each method promises."""
 
     dialect = "sqlite"
+    deadlocks = 0  # there is one writer at a time
 
-    def __init__(self, connection: sqlite3.Connection) -> None:
-        self._connection = connection
+    def __init__(self, address: Address) -> None:
+        self._connection = sqlite3.connect(address.path, timeout=BUSY_S, isolation_level=None)
+        self._log = Log(address.path)
         self._items: dict[str, Item] = {}
 
     @property
@@ -136,6 +140,7 @@ class SqliteStorage:
                 self._connection.execute(INSERT[TABLES[type(row)]], astuple(row))
             if batch.seen is not None:
                 self._connection.execute("REPLACE INTO mqtt_seen VALUES (?, ?, ?, ?)", astuple(batch.seen))
+        self._log.grown(len(batch.samples) + len(batch.rows))
 
     def read(self, statement: str) -> list[tuple[Any, ...]]:
         """See `Storage`."""
@@ -148,6 +153,7 @@ class SqliteStorage:
         with _translated(), self._transaction():
             for statement in statements:
                 changed = self._connection.execute(statement).rowcount
+        self._log.grown(changed)
         return changed
 
     def seen(self, client: str) -> list[SeenTurn]:
@@ -216,6 +222,7 @@ class SqliteStorage:
 
     def close(self) -> None:
         """See `Storage`."""
+        self._log.close()
         self._connection.close()
 
     # -- inside

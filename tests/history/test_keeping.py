@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import pytest
 from pydantic import ValidationError
 
+from services.apartment.home import Home
+from services.apartment.home import Item as HomeItem
 from services.history import Config
 from services.history.keeping import Keep, by_item, pieces
 from services.history.service import PAUSE_S, ROUND_EVERY_S, SETTLE_S, History
-from services.home import Home
-from services.home import Item as HomeItem
 from services.storage import Batch, Item, Sample, Storage, keeping, open_storage, reading
 from tests.databases import Database
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 from services.history.answers import answer
-from services.history_payloads import HistoryGet
 from services.payloads import stamp
+from services.payloads.history import HistoryGet
 from services.storage import Batch, Item, Sample, Storage, open_storage, reading
 from tests.databases import Database, fresh_mariadb, fresh_sqlite
 from tests.storage import day

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from services import topics
+from services.apartment.home import Home
 from services.bus import Message
 from services.errors import Unavailable
 from services.history import Config, start
 from services.history.service import History
-from services.home import Home
 from services.payloads import Point
-from services.robot_payloads import MissionEvent, MissionResult
+from services.payloads.robot import MissionEvent, MissionResult
 from services.storage import Batch, Item, Mission, Sample, open_storage
 from services.topics import HISTORY_GET, LateCommand
 from tests.storage.day import at

@@ -17,7 +17,7 @@ from typing import Any
 
 from services import payloads
 from services.history import answers
-from services.history_payloads import HistoryGet
+from services.payloads.history import HistoryGet
 from services.peers import mariadb, mosquitto
 from services.persistence.openhab_tables import LAYOUTS
 from services.persistence.writers import Writers

@@ -18,10 +18,10 @@ from typing import Any
 
 import paho.mqtt.client as paho
 
+from services.apartment.home import Home, Item
 from services.aside import Aside
 from services.bus.connection import Address as BusAddress
 from services.bus.mqtt import MqttBus
-from services.home import Home, Item
 from services.persistence import Config
 from services.persistence.service import Persistence
 from services.persistence.writers import Writers

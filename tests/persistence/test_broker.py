@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from services import peers
+from services.apartment.home import Home, Item
 from services.aside import Aside
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
-from services.home import Home, Item
 from services.peers import free_port, mosquitto
 from services.persistence import Config, start
 from services.persistence.broker import DROPPED, HELD, Watch

@@ -14,8 +14,8 @@ import pytest
 from pydantic import SecretStr
 
 from services import peers
+from services.apartment.home import Home, Item
 from services.errors import Unavailable
-from services.home import Home, Item
 from services.peers import mariadb
 from services.persistence import Config, start
 from services.persistence.service import Persistence

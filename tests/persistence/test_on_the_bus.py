@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from services.apartment.home import Home, Item
 from services.aside import Aside
 from services.bus.memory import Hub, MemoryBus
-from services.home import Home, Item
 from services.persistence import Config, start
 from services.runner import Runner
 from services.topics import HOME_STATE, SERVICE_STATUS

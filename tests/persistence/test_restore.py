@@ -11,12 +11,12 @@ import pytest
 from pydantic import SecretStr
 
 from services import peers
+from services.apartment.home import Home, Item
 from services.aside import Aside
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.client import Client, connected
 from services.config import BusSettings
-from services.home import Home, Item
 from services.peers import free_port, mosquitto
 from services.persistence import Config, start
 from services.runner import Runner

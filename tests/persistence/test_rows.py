@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services import states
+from services.apartment.home import Home, Item
 from services.bus import Message
 from services.errors import BadMessage
-from services.home import Home, Item
 from services.payloads import Diagnostic, OrderResult, Point, Quaternion, ScanResult, ScanState
+from services.payloads.robot import MissionEvent, MissionResult, MissionState
 from services.persistence import rows
-from services.robot_payloads import MissionEvent, MissionResult, MissionState
 from services.storage import CameraOrder, Mission, Sample, Scan, Sighting
 from services.storage import Diagnostic as DiagnosticRow
 from services.topics import (

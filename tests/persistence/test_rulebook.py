@@ -8,9 +8,9 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
+from services.apartment.home import Home, Item
 from services.bus import Message
 from services.errors import ConfigError
-from services.home import Home, Item
 from services.persistence import Config, check
 from services.persistence.service import Persistence
 from services.storage import open_storage

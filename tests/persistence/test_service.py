@@ -11,9 +11,9 @@ from time import monotonic
 import pytest
 from pydantic import SecretStr, ValidationError
 
+from services.apartment.home import Home, Item
 from services.bus import Message, topic_matches
 from services.errors import BadMessage, ConfigError, Unavailable
-from services.home import Home, Item
 from services.payloads import Diagnostic, OrderResult
 from services.peers import free_port
 from services.persistence import Config, start

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from services.home import Home, Item
+from services.apartment.home import Home, Item
 from services.persistence import strategies
 from services.persistence.strategies import Restore, Value
 

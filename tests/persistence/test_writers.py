@@ -11,11 +11,11 @@ import pytest
 from pydantic import SecretStr, ValidationError
 
 from services import peers
+from services.apartment.home import Home, Item
 from services.aside import Aside
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.errors import ConfigError
-from services.home import Home, Item
 from services.peers import mariadb, mosquitto
 from services.persistence import Config, start
 from services.persistence.writers import Writers

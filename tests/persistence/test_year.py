@@ -8,8 +8,8 @@ from contextlib import closing
 
 from services.history import answers
 from services.history.keeping import pieces
-from services.history_payloads import HistoryGet
 from services.payloads import stamp
+from services.payloads.history import HistoryGet
 from services.storage import Storage, open_storage
 from tests.databases import Database
 from tests.persistence import year_bench as year

@@ -18,8 +18,8 @@ from typing import Any
 from services.history import answers
 from services.history.keeping import Keep, pieces
 from services.history.service import PAUSE_S
-from services.history_payloads import HistoryGet
 from services.payloads import stamp
+from services.payloads.history import HistoryGet
 from services.peers import mariadb, mosquitto
 from services.storage import Address, Item, Storage, keeping, open_storage, read_address
 from tests.persistence import figures

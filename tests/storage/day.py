@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
+from services.apartment.home import Home, Item
 from services.bus import Message
-from services.home import Home, Item
 from services.payloads import Diagnostic, Point, ScanResult, ScanState, stamp
 from services.topics import CAMERA_SCAN_RESULT, CAMERA_SCAN_STATE, DIAGNOSTICS, HOME_STATE
 

@@ -12,7 +12,7 @@ import pymysql
 import pytest
 
 from services.errors import BadMessage, ConfigError, Unavailable
-from services.peers import free_port, mariadb
+from services.peers import free_port, mariadb, wait_until
 from services.storage import Batch, Item, Sample, open_storage, read_address
 from services.storage.migrate import statements, versions
 from tests.databases import Database, connected, fresh_mariadb
@@ -203,3 +203,20 @@ class TestMariaDb:
             open_storage(database.address).close()
             admin.query("SET GLOBAL innodb_flush_log_at_trx_commit=1")
         assert "a power cut can lose" in caplog.text
+
+
+def test_the_log_of_a_file_is_emptied_beside_the_writer(tmp_path: Path) -> None:
+    file = tmp_path / "bus.db"
+    with closing(open_storage(f"sqlite:///{file}")) as storage:
+        storage.add_items([Item("Kitchen_Temp", "Number")])
+        sizes = []
+        for turn in range(200):
+            times = range(turn * 100, turn * 100 + 100)
+            storage.write(
+                Batch(samples=[Sample("Kitchen_Temp", time * 1_000_000, float(time), None) for time in times])
+            )
+            sizes.append(file.with_name("bus.db-wal").stat().st_size)
+        wait_until(lambda: file.stat().st_size > 200_000, "the rows are in the file itself")
+        assert max(sizes) < 8_000_000
+        assert len(storage.samples("Kitchen_Temp")) == 20_000
+    assert not file.with_name("bus.db-wal").exists()

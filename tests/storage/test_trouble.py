@@ -55,6 +55,7 @@ def test_a_batch_that_has_to_give_way_in_a_deadlock_is_written_whole_afterwards(
         other.commit()
         writer.join(30)
         assert not failed
+        assert storage.deadlocks == 1
         assert [one.num for one in storage.samples("A")] == [8.0]  # of two rows with one key the first stays
         assert [one.num for one in storage.samples("B", since=T)] == [7.0, 3.0]
 
