@@ -22,6 +22,7 @@ from services.whole_file import PRIVATE, whole_file, write_whole
 FORM = 1  # of the archive
 DATABASE = "database.jsonl"
 CONFIG, STATE = "config/", "state/"
+CLIENT = "client"  # who a service is to the broker, in its folder (`process.py`): its own, and nobody else's to know
 LARGEST = 1 << 30  # bytes of one file that is put back; a small archive may claim to hold a large one
 
 
@@ -60,6 +61,7 @@ def _files(folder: Path, but: tuple[Path, ...], database: Address | None) -> lis
         inner = path.relative_to(folder)
         hidden = any(part.startswith(".") for part in inner.parts)
         secret = inner.parts[0] in ("secrets", "broker", "secrets.yaml")
+        secret = secret or path.name == CLIENT
         if not path.is_file() or path.is_symlink() or hidden or secret or any(map(path.is_relative_to, but)):
             continue
         if stored is None or not path.name.startswith(stored):

@@ -169,6 +169,18 @@ def test_what_was_in_mariadb_can_go_on_in_a_file(tmp_path: Path, request: pytest
         assert {name: storage.samples(name) for name in storage.items} == before
 
 
+def test_who_a_service_is_to_the_broker_is_not_in_a_backup(tmp_path: Path) -> None:
+    home = Home(tmp_path / "home", fresh_sqlite(tmp_path))
+    client = home.folder / "state" / "persistence" / "client"
+    client.parent.mkdir(parents=True, exist_ok=True)
+    client.write_text("persistence-0123456789abcdef")
+    assert home.run("backup", str(tmp_path / "all.zip")).returncode == 0
+    with zipfile.ZipFile(tmp_path / "all.zip") as archive:
+        names = archive.namelist()
+    assert names
+    assert not [name for name in names if name.endswith("/client")]
+
+
 def forged(folder: Path, name: str, text: str) -> Path:
     """An archive with this one file in it."""
     file = folder / "forged.zip"

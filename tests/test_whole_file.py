@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -53,3 +54,20 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
     write_whole(tmp_path / "link", b"new")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "real").read_text() == "new"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="nobody else may give files away")
+def test_what_root_writes_belongs_to_whom_it_belonged_or_to_whom_the_folder_does(tmp_path: Path) -> None:
+    somebody, other = 12345, 12346
+    folder, file = tmp_path / "camera-ip1", tmp_path / "camera-ip1" / "learnt.json"
+    folder.mkdir()
+    os.chown(folder, somebody, somebody)
+    write_whole(file, "new")
+    assert (file.stat().st_uid, file.stat().st_gid) == (somebody, somebody)
+    os.chown(file, other, somebody)
+    write_private(file, "newer")
+    assert (file.stat().st_uid, file.stat().st_gid, mode(file)) == (other, somebody, PRIVATE)
+    write_whole(folder / "one" / "more" / "file", "deep")
+    assert {
+        path.stat().st_uid for path in (folder / "one", folder / "one" / "more", folder / "one" / "more" / "file")
+    } == {somebody}

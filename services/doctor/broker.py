@@ -5,13 +5,11 @@ from __future__ import annotations
 import socket
 import ssl
 import statistics
-import threading
 import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 from services.bus import connection
 from services.bus.connection import Address
@@ -67,23 +65,12 @@ def _unreachable(where: str, error: OSError) -> Finding:
 
 def _refusal(at: Address) -> str | None:
     """The broker's words when it does not let us in."""
-    said: list[Any] = []
-    answered = threading.Event()
-
-    def on_connect(_client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
-        said.append(reason)
-        answered.set()
-
     asking = connection.client(at, at.protocol)
-    asking.on_connect = on_connect
     connection.connect(asking, at, at.protocol)
-    asking.loop_start()
-    answered.wait(ANSWER_S)
-    asking.disconnect()
-    asking.loop_stop()
-    if not said:
+    reason = connection.answer(asking)
+    if reason is None:
         return "no answer"
-    return str(said[0]) if said[0].is_failure else None
+    return str(reason) if reason.is_failure else None
 
 
 @contextmanager

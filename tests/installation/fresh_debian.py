@@ -171,7 +171,8 @@ def well(machine: Machine) -> None:
     assert len(units) >= 4, units
     for unit in units:
         said = machine.run(f"systemctl show -p ActiveState -p NRestarts {unit}").split()
-        assert set(said) == {"ActiveState=active", "NRestarts=0"}, (unit, said)
+        if set(said) != {"ActiveState=active", "NRestarts=0"}:
+            raise Failed(f"{unit}: {said}\n" + machine.run(f"journalctl --no-pager -n 80 -u {unit}"))
 
 
 def used(machine: Machine) -> None:
@@ -206,6 +207,10 @@ sha256sum $(find /etc/apartment -name '*.yaml' -not -path '*/secrets/*' | sort)
     machine.run(filled(backup))
     assert machine.run(look) == before
     assert "ON" in before
+    machine.run(f"""\
+until {_called("order ip1 SaveAs Here")}; do sleep 1; done
+grep Here $(grep -rl Here /etc/apartment/ip1)
+""")
 
 
 def _called(words: str) -> str:
@@ -241,6 +246,7 @@ def follow(_: Random) -> float:
             well(machine)
             used(machine)
             restored(machine, backup)
+            well(machine)
             machine.run(filled(upgrade))
             well(machine)
         with booted(machine):  # after the power was away
