@@ -9,9 +9,9 @@ from math import radians
 import numpy as np
 
 from services import document
+from services.apartment import zoom_levels
 from services.camera.address import Address
 from services.camera.alarm.listener import Listener
-from services.camera.calibration import levels
 from services.camera.calibration.study import Studio
 from services.camera.device import Device
 from services.camera.places import Places
@@ -77,7 +77,11 @@ def eye(config: Config) -> Eye:
         except (ValueError, AttributeError) as error:
             raise ConfigError([f"{file}:1: {error}"]) from error
     mount = config.mount.mount() if config.mount else None
-    zoom = levels.read(levels.of_lens(config.folder / config.camera_info)) if config.camera_info is not None else ()
+    zoom = (
+        zoom_levels.read(zoom_levels.of_lens(config.folder / config.camera_info))
+        if config.camera_info is not None
+        else ()
+    )
     widest, noise, (doubt_m, doubt_deg) = config.zoom_range[0], config.reading_noise_deg, config.mount_doubt
     doubt = np.diag(np.square([doubt_m] * 3 + [radians(doubt_deg)] * 3))
     return Eye(config.name, config.dictionary, lens, mount, widest, zoom, angle_noise_deg=noise, mount_doubt=doubt)

@@ -99,12 +99,13 @@ class Rig:
         self.skill.forget_senses(flip=True, mirror=True)
         self.near = cast(Reading, self._send(Status(), 0).result)  # as the service polls it
 
-    def go(self, goal: Goal, **more: Any) -> Outcome:
-        """One goal."""
+    def go(self, goal: Goal, near: float = 0.0, **more: Any) -> Outcome:
+        """One goal; so many degrees beside it will do."""
         here, pushed = self.truth(), self.pushed()
         self.wire.commands = self.wire.requests = 0
         began = self.now
-        run = self.drive(goto(LIMITS.goal(*goal), LIMITS, self.skill, self.now + 60.0, near=self.near, **more))
+        wanted = replace(LIMITS.goal(*goal), near=near)
+        run = self.drive(goto(wanted, LIMITS, self.skill, self.now + 60.0, near=self.near, **more))
         there = self.truth()
         self.near = run.result.reading if isinstance(run.result, Arrival) else None
         return Outcome(

@@ -1,7 +1,7 @@
 """Calibrations as they are ordered: the plan for each, what is said meanwhile, and what becomes of the result.
 
 How a lens, a mount, a zoom is learnt is in `lens.py`, `mount.py` and `zoom.py`, the motors in `ptz/`; the files are in
-`files.py` and `levels.py`.
+`files.py` and `services/apartment/zoom_levels.py`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Literal
 
 from services import topics
+from services.apartment import zoom_levels
 from services.bus import Message
 from services.camera import orders
-from services.camera.calibration import files, lens_page, levels, mount_page, zoom_page
+from services.camera.calibration import files, lens_page, mount_page, zoom_page
 from services.camera.calibration.lens import Showing
 from services.camera.calibration.mount import Touring
 from services.camera.calibration.section import settings
@@ -141,9 +142,12 @@ class Calibrator:
             self.config.limits, self.trips.skill, self._look, lambda a, b: compared(a, b, how), self._say_climb
         )
         found = yield from climb.plan()
-        lens, file = self.scanner.eye.lens, levels.of_lens(self._lens_file())
+        lens, file = self.scanner.eye.lens, zoom_levels.of_lens(self._lens_file())
         page, _ = yield from study(lambda: zoom_page.page(self.config.name, found, climb.visits, lens, climb.wide, how))
-        levels.write(file, found, lens)
+        try:
+            zoom_levels.write(file, found, lens)
+        except OSError as error:
+            raise Refused(f"{file} cannot be written: {error.strerror or error}") from error
         self.scanner.eye = replace(self.scanner.eye, levels=found)
         return Calibration(
             what="zoom",

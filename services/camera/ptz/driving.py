@@ -65,8 +65,9 @@ class Driving:
             own.learn_on_the_way(self.helm.skill, here, way, begun, reply, seen)
             arrives = begun.received + own.longest(self.helm.skill, here, way.to)
         certain = own.certain(self.helm.skill, way)
-        reading, now = yield from at_rest(self.helm, arrives, way.to, now, certain=certain)
-        there = self.helm.limits.pose(reading)
+        reading, now, rests = yield from at_rest(self.helm, arrives, way.to, now, certain=certain)
+        self.helm.rests = arrives
+        there = self.helm.limits.pose(reading) if rests else way.to  # one on its last bit of way teaches nothing
         own.judge(self.helm.skill, here, way, there)
         self.helm.skill.zoomed = (reading.zoom, way.to[ZOOM]) if abs(reading.zoom - way.to[ZOOM]) <= 1.0 else None
         self.helm.stand(reading)
@@ -75,10 +76,11 @@ class Driving:
 
 def at_rest(
     helm: Helm, arrives: float, to: Pose, now: float, *, certain: bool, about: float = 0.0
-) -> Plan[tuple[Reading, float]]:
-    """Looks until what the firmware drives has ended; `certain`: it is known exactly where that leads.
+) -> Plan[tuple[Reading, float, bool]]:
+    """Looks until what the firmware drives has ended, as good as; `certain`: it is known exactly where that leads.
 
     `about`: that is not known quite exactly, but so few degrees; there one look is enough if it tells of rest.
+    Returns the reading, when it came, and whether it surely shows the camera at rest.
     """
     skill = helm.skill
     yield from wait(max(now, arrives - skill.paces[PAN].other(READ_LATE) + skill.arrives_late))
@@ -91,8 +93,9 @@ def at_rest(
         rests = helm.tells_rest(seen[-1])
         there = certain and off <= NEARER_DEG and (rests or not about)
         on = helm.beside(pose) and off <= about and rests
-        if there or on or (len(seen) > 1 and same(seen[-2], seen[-1])):
+        still = len(seen) > 1 and same(seen[-2], seen[-1])
+        if there or on or still:
             break
     if certain and (there or not same(seen[0], seen[-1])):
         skill.expect_arrival(there=len(seen) == 1)
-    return seen[-1], reply.received
+    return seen[-1], reply.received, rests or still

@@ -16,10 +16,14 @@ EDGE_DEG = 0.2  # goals keep this far from a stop, so that nothing pushes agains
 
 @dataclass(frozen=True)
 class Goal:
-    """A pose to reach; `clamped`: it was inside the dead arc and is now at its nearer edge."""
+    """A pose to reach; `clamped`: it was inside the dead arc and is now at its nearer edge.
+
+    `near`: pan and tilt may end so many degrees from it, where that is more than what a reading can tell.
+    """
 
     pose: Pose
     clamped: bool = False
+    near: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -38,12 +38,18 @@ class Helm:
         self.commands = 0
         self.zoom_ends: float | None = None
         self.quiet = 0.0  # until then the firmware drives by itself
+        self.rests = 0.0  # when it came to rest, as is reckoned
         self.course = Course(limits, skill, self.aim)
 
     @property
     def left(self) -> int:
         """How many commands are left."""
         return COMMANDS - self.commands
+
+    @property
+    def near(self) -> float:
+        """As near as that a reading of pan or tilt has arrived, degrees."""
+        return max(self.skill.near, self.goal.near)
 
     def pose(self, reading: Reading) -> Pose:
         """A reading as a pose, with what is known better of zoom."""
@@ -52,7 +58,7 @@ class Helm:
 
     def beside(self, pose: Pose) -> bool:
         """Whether this is not the goal yet."""
-        return any(abs(self.goal.pose[axis] - pose[axis]) > self.skill.near for axis in (PAN, TILT))
+        return any(abs(self.goal.pose[axis] - pose[axis]) > self.near for axis in (PAN, TILT))
 
     def stand(self, reading: Reading) -> None:
         """It was read at rest."""
@@ -96,6 +102,7 @@ class Helm:
             now = yield from self.stop((yield from wait(max(now, self.zoom_ends))))
             settled = self._settled()
         now = yield from wait(max(now, settled))
+        self.rests = max(self.quiet, self.course.rests_at())
         reply = yield from self.send(Status())
         reading = cast(Reading, reply.result)
         self._weigh(reading)
@@ -164,8 +171,10 @@ class Helm:
         return max(self.quiet, self.course.rests_at()) - pace.other(READ_LATE) + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:
-        """Where zoom truly stands: what was reckoned, as far as its reading and its range allow."""
-        if self.zoom_ends is None:
+        """Where zoom truly stands: what was reckoned, as far as its reading and its range allow; as before, at rest."""
+        turned = any(one.level for one in self.course.told[ZOOM])
+        stayed = not turned and self.skill.zoomed is not None and self.skill.zoomed[0] == reading.zoom
+        if self.zoom_ends is None and not stayed:
             half = max(0.1, self.skill.zoom_grid / 2)
             low, high = self.limits.zoom
             reckoned = self.course.stopped(ZOOM, FOREVER)

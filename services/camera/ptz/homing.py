@@ -36,7 +36,7 @@ class Homing:
         helm = self.helm
         for _ in range(RUNGS):
             way = self._way(TILT, now)
-            if helm.course.told[TILT] and abs(way.distance) <= helm.skill.near:
+            if helm.course.told[TILT] and abs(way.distance) <= helm.near:
                 break
             leg = self._leg(way)
             turning = {TILT: leg.parts[TILT].speed * (sign(way.distance) or 1), PAN: self._along(leg.held, now)}
@@ -63,13 +63,14 @@ class Homing:
     def _meets(self, now: float) -> bool:
         """Whether tilt will rest at its goal when it is ended now; after a late answer it may be beyond."""
         ends = now + self.helm.skill.timing.usual
-        return abs(self.helm.aim[TILT] - self.helm.course.stopped(TILT, ends)) <= self.helm.skill.near
+        return abs(self.helm.aim[TILT] - self.helm.course.stopped(TILT, ends)) <= self.helm.near
 
     def _way(self, axis: int, now: float) -> Way:
         helm = self.helm
         distance = helm.aim[axis] - helm.course.stopped(axis, now + helm.skill.timing.usual)
         low, high = helm.limits.ranges[axis]
-        return Way(distance, high - helm.aim[axis] if distance > 0 else helm.aim[axis] - low, helm.skill.paces[axis])
+        room = high - helm.aim[axis] if distance > 0 else helm.aim[axis] - low
+        return Way(distance, room, helm.skill.paces[axis], helm.near)
 
     def _leg(self, way: Way) -> Leg:
         """A leg that will hardly end at the goal ends before it for sure: a slower one goes on from there."""

@@ -61,7 +61,8 @@ class Hopping:
         pan, tilt, zoom = self.glides
         to = (pan.goal, tilt.goal, zoom.goal)
         arrives = max(self._ends(), zoom.ends)
-        reading, now = yield from at_rest(self.helm, arrives, to, now, certain=honoured == "yes", about=ABOUT_DEG)
+        self.helm.rests = arrives
+        reading, now, _ = yield from at_rest(self.helm, arrives, to, now, certain=honoured == "yes", about=ABOUT_DEG)
         scale.learn(skill, self.hops, to, self.helm.limits, reading)
         self.helm.stand(reading)
         return reading, now
@@ -74,7 +75,7 @@ class Hopping:
             now = yield from self._send(now)
             off = {axis: abs(self.helm.aim[axis] - self.glides[axis].goal) for axis in (PAN, TILT)}
             worst = max(off, key=lambda axis: off[axis])
-            if off[worst] <= self.helm.skill.near - SHARP_DEG or self.helm.left < FEW:
+            if off[worst] <= self.helm.near - SHARP_DEG or self.helm.left < FEW:
                 break
             far = off[worst] > MIDST_DEG
             follows = self.glides[worst].brakes - timing.spread if far else self._ends()

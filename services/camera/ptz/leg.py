@@ -79,7 +79,7 @@ def _speeds(ways: dict[int, Way]) -> Iterator[dict[int, int]]:
 def _part(way: Way, speed: int, skill: Skill) -> Part:
     """An axis on its own: short of the goal where a late end would push against the stop behind it."""
     short = min(abs(way.distance), feared(way, speed, abs(way.distance), skill))
-    return Part(speed, held_for(way.pace, speed, abs(way.distance) - short), -short, short > skill.near)
+    return Part(speed, held_for(way.pace, speed, abs(way.distance) - short), -short, short > way.near)
 
 
 def _legs(ways: dict[int, Way], speeds: dict[int, int], skill: Skill) -> Iterator[Leg]:
@@ -114,9 +114,9 @@ def _judged(leg: Leg, outlook: Outlook, left: int, runs: dict[int, int]) -> Leg:
         beyond = part.off + way.pace.rate(part.speed) * skill.timing.tail - way.room
         if beyond > (CRAWL_DEG if part.speed == 1 else 0.0):
             return replace(leg, cost=DANGER + beyond)  # a late end may push against a stop
-        chances.append(chance(part.off, spread, skill.near))
+        chances.append(chance(part.off, spread, way.near))
         if chances[-1] < 1.0:
-            misses[axis] = max(skill.near, abs(part.off)) + spread / 2
+            misses[axis] = max(way.near, abs(part.off)) + spread / 2
     misses |= {axis: abs(way.distance) for axis, way in ways.items() if axis not in leg.parts}
     known = all(ways[axis].pace.known(part.speed) for axis, part in leg.parts.items())
     running = {axis: part.speed for axis, part in leg.parts.items()} == runs

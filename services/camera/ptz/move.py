@@ -32,11 +32,12 @@ MOVED = 0.15  # degrees or levels
 
 @dataclass(frozen=True)
 class Arrival:
-    """Where a move ended: verified, at rest."""
+    """Where a move ended: verified, at rest. `rests` is since when, as far as that was reckoned; 0: it did not turn."""
 
     reading: Reading
     at: float
     clamped: bool = False
+    rests: float = 0.0
 
 
 def goto(
@@ -74,7 +75,7 @@ class Move:
         for _ in range(MOST_LEGS):
             out = self._out(reading)
             if not out and self.helm.zoom_ends is None:
-                return Arrival(reading, now, self.helm.goal.clamped)
+                return Arrival(reading, now, self.helm.goal.clamped, self.helm.rests)
             if now > self.until or self.stuck >= STUCK:
                 raise DeviceError(self._failed(reading, "in time" if now > self.until else "the camera does not turn"))
             before = self.helm.limits.pose(reading)
@@ -108,7 +109,7 @@ class Move:
     def _out(self, reading: Reading) -> list[int]:
         """The axes that are not where they should be; zoom only while it does not turn."""
         pose = self.helm.limits.pose(reading)
-        out = [axis for axis in (PAN, TILT) if abs(self.helm.goal.pose[axis] - pose[axis]) > self.helm.skill.near]
+        out = [axis for axis in (PAN, TILT) if abs(self.helm.goal.pose[axis] - pose[axis]) > self.helm.near]
         if self.helm.zoom_ends is None and abs(self.helm.goal.pose[ZOOM] - pose[ZOOM]) > self.helm.zoom_near:
             out.append(ZOOM)
         return out

@@ -25,11 +25,15 @@ FINE = 6.0  # steps of distance in each factor of e
 
 @dataclass(frozen=True)
 class Way:
-    """What one axis has before it: the distance with its sign, and how much room there is behind its end."""
+    """What one axis has before it: the distance with its sign, and how much room there is behind its end.
+
+    `near`: so far from its goal it has arrived.
+    """
 
     distance: float
     room: float
     pace: Pace
+    near: float
 
 
 @dataclass
@@ -42,7 +46,7 @@ class Outlook:
 
     def seconds(self, axis: int, distance: float, left: int) -> float:
         """From rest at a distance (positive) until it is read to be there; `left` commands until then."""
-        if distance <= self.skill.near:
+        if distance <= self.ways[axis].near:
             return 0.0
         if left < LEG:
             return OVER_S
@@ -62,13 +66,11 @@ class Outlook:
             return OVER_S
         held = max(self.skill.timing.usual, held_for(way.pace, speed, distance - short))
         left -= 0 if way.pace.known(speed) else 1  # it will be looked at
-        if short > self.skill.near:
+        if short > way.near:
             return held + self.seconds(axis, short, left - 1)
         spread = spread_of(way.pace, speed, held, self.skill)
-        correction = CORRECTION_S * self.skill.timing.usual + self.seconds(
-            axis, self.skill.near + spread / 2, left - LEG
-        )
-        return held + (1 - chance(-short, spread, self.skill.near)) * correction
+        correction = CORRECTION_S * self.skill.timing.usual + self.seconds(axis, way.near + spread / 2, left - LEG)
+        return held + (1 - chance(-short, spread, way.near)) * correction
 
 
 def feared(way: Way, speed: int, distance: float, skill: Skill) -> float:

@@ -85,7 +85,7 @@ class Turning:
         turned = [axis for axis in (PAN, TILT) if self.helm.course.told[axis]]
         if any(self.helm.reckoned(axis) > RECKONED_DEG for axis in turned):
             return []
-        return [axis for axis in turned if self._off(axis, now) > self.helm.skill.near - SHARP_DEG]
+        return [axis for axis in turned if self._off(axis, now) > self.helm.near - SHARP_DEG]
 
     def _beside(self, now: float) -> list[int]:
         """The axes that rest beside the goal as far as is reckoned: while the other goes on, they can be put right."""
@@ -111,7 +111,7 @@ class Turning:
             spread = self.helm.skill.paces[axis].rate(part.speed) * self.helm.skill.timing.spread
             spread += self.helm.course.doubt(axis, ends)
             left = (self.helm.aim[axis] - self.helm.course.stopped(axis, ends)) * sign(self.helm.course.levels[axis])
-            if left > spread + self.helm.skill.near:
+            if left > spread + self.helm.near:
                 ahead.append(axis)
         return ahead if leg.feared else []
 
@@ -120,7 +120,7 @@ class Turning:
         levels = [0, 0, 0]
         for axis in axes if self.helm.skill.diagonals else axes[:1]:
             distance, least = self.helm.aim[axis] - self.helm.course.stopped(axis, now), self.helm.least(axis)
-            if least - abs(distance) > self.helm.skill.near:
+            if least - abs(distance) > self.helm.near:
                 levels[axis] = -sign(distance)
         if any(levels):
             return (yield from self.helm.start((levels[0], levels[1], levels[2]))).received
@@ -134,7 +134,8 @@ class Turning:
             low, high = self.helm.limits.ranges[axis]
             room = high - self.helm.aim[axis] if distance > 0 else self.helm.aim[axis] - low
             doubt = self.helm.course.doubt(axis, now) if self.helm.course.told[axis] else 0.0
-            ways[axis] = Way(distance, room - 2 * max(0.0, doubt - LOST_DEG), self.helm.skill.paces[axis])
+            room -= 2 * max(0.0, doubt - LOST_DEG)
+            ways[axis] = Way(distance, room, self.helm.skill.paces[axis], self.helm.near)
         left = self.helm.left - (ZOOM_COMMANDS if zoom else 0)
         leg = choose(ways, self.helm.skill, left=left, runs=self._runs(ways))
         return leg, {axis: part.speed * (sign(ways[axis].distance) or 1) for axis, part in leg.parts.items()}
@@ -177,7 +178,7 @@ class Turning:
             send = min([send, *(self._safe(axis, self._rate(axis), now) - usual for axis in self._along(left))])
             if look == LOOKS or send - now < usual + spread:
                 break
-            enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else self.helm.skill.near
+            enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else self.helm.near
             small = {axis: max(LOOK_PART * spread * rate, enough) for axis, rate in rates.items()}
             if all(self.helm.course.doubt(axis, ends[axis]) < small[axis] for axis in left):
                 break

@@ -60,8 +60,7 @@ class Live:
         """Ends a stream of our own, and forgets what has come."""
         self._open.close()
         self._newest = self._darkroom = None
-        self._came.clear()
-        self._done.clear()
+        self._came, self._done = deque(), deque()  # the darkroom may still be at one of the old ones
 
     @property
     def latency(self) -> float:
@@ -77,7 +76,7 @@ class Live:
         while self._came:
             for visit, frame in self.footage.take(self._came.popleft()):
                 if self._darkroom is not None:
-                    self._darkroom.submit(self._develop, visit, frame, self.footage.at(frame))
+                    self._darkroom.submit(_develop, visit, frame, self.footage.at(frame), self._done)
         done = []
         while self._done:
             done.append(self._done.popleft())
@@ -122,9 +121,10 @@ class Live:
         self.unfit = unfit
         return not unfit
 
-    def _develop(self, visit: Visit, frame: Frame, at: float) -> None:
-        """On the darkroom's thread."""
-        try:
-            self._done.append((visit, at, pictures.encode(frame.develop(), FINE)))
-        except Away:
-            visit.got -= 1
+
+def _develop(visit: Visit, frame: Frame, at: float, done: deque[tuple[Visit, float, bytes]]) -> None:
+    """On the darkroom's thread."""
+    try:
+        done.append((visit, at, pictures.encode(frame.develop(), FINE)))
+    except Away:
+        visit.got -= 1

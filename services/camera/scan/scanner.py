@@ -30,6 +30,7 @@ from services.camera.scan.source import Moving, Source
 from services.camera.scan.wish import ScanFor
 from services.camera.settings import Config
 from services.errors import DeviceError
+from services.memory import give_back
 from services.payloads import OrderState, Place, ScanResult, ScanState
 
 STATE_S = 0.5  # between two states of a scan that runs
@@ -97,6 +98,7 @@ class Scanner:
             second="always" if order.full else self.config.second_turn,
             mode=self.picture.mode,
             near=self.bulletin.at_rest(now, FRESH_S),
+            slack=self.eye.slack_deg,
             move_timeout_s=self.config.move_timeout_s,
             likely=next(
                 (place for place in map(self.seen_at.get, order.targets or self.targets) if place in routine), None
@@ -114,7 +116,7 @@ class Scanner:
         if analysed.jpeg is not None and analysed.detections:
             frame = self.scan.findings.taken[analysed.number]
             markers = sorted({one.marker for one in analysed.detections})
-            self.album.keep(frame.place, self.scan.spots.index(frame.spot), markers, frame.at, analysed.jpeg)
+            self.album.keep(frame.place, id(frame.spot), markers, frame.at, analysed.jpeg)
         if analysed.jpeg is not None and self.show:
             self._publish(topics.CAMERA_SCAN_IMAGE.message(analysed.jpeg, cam=self.config.name))
 
@@ -140,6 +142,7 @@ class Scanner:
             return
         scan.source.close()
         self.scan = None
+        give_back()
         if self.modes.changed:
             self.begin(self.restored(), now)
         if state == "done":

@@ -8,11 +8,10 @@ Not here: the order of the places (`route.py`), where frames come from (`source.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, cast
 
 from services.camera.plan import Plan, attempt, wait
-from services.camera.ptz.drive import longest
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
@@ -39,7 +38,8 @@ Look = Callable[[Frame, bytes], None]
 class Scan:
     """One scan: the plan that drives it. `routine`: the places in their order; `second`: when there is a second turn.
 
-    `likely` is the place that showed a target last; `near` where the camera looks, if that is known.
+    `likely` is the place that showed a target last; `near` where the camera looks, if that is known; `slack` tells how
+    many degrees beside a place saved at a zoom will do.
     """
 
     name: str
@@ -61,6 +61,7 @@ class Scan:
     trouble: str = ""  # what it waits for
     spots: list[Spot] = field(default_factory=list)
     looks: Look = lambda frame, jpeg: None
+    slack: Callable[[float], float] = lambda zoom: 0.0
     _lost: int = 0
     _settles: float = 0.0  # when the picture's light has settled after a change of its mode
     _far: float = 0.0
@@ -160,12 +161,12 @@ class Scan:
             yield from self.modes.note(reply)
 
     def _go(self, place: Place, now: float) -> Plan[float]:
-        goal = self.limits.goal(place.pan, place.tilt, self.limits.zoom[0])
+        goal = replace(self.limits.goal(place.pan, place.tilt, self.limits.zoom[0]), near=self.slack(place.zoom))
         presets = {} if place.preset is None else {place.preset: (place.pan, place.tilt, place.zoom)}
         near, self.near = self.near, None
-        here = self.limits.pose(near) if near is not None else goal.pose
         move = goto(goal, self.limits, self.skill, now + self.move_timeout_s, near=near, presets=presets)
-        arrival = yield from self.source.followed(move, now, longest(self.skill, here, goal.pose))
+        arrival = yield from self.source.followed(move, now)
+        self.source.reckon(arrival.rests)
         now = yield from self.source.followed(widest(self.limits, self.skill, arrival.at), self.source.rested)
         self.near = arrival.reading
         return now

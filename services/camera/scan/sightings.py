@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import acos, atan2, cos, degrees, hypot, radians, sin
+from math import acos, atan, atan2, cos, degrees, hypot, radians, sin
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from services.vision.pose import Located, View, locate_each
 from services.vision.prior import Prior
 from services.vision.zoom import WIDEST, Level, Magnification, at_level
 
+LEAST_TIMES = 1.1  # what a zoom magnifies by at least, of which that is not known
+MOST_SLACK_DEG = 3.0
+HALF_HEIGHT = 9 / 16  # over the focal length, of a lens that is not known: about 90 degrees wide
 WELL_KNOWN = 0.01  # share of the magnification's uncertainty above which no distance is told: 5 cm at 5 m
 
 
@@ -74,6 +77,15 @@ class Eye:
     levels: tuple[Level, ...] = ()
     angle_noise_deg: float = 0.05  # standard deviation of a reading
     mount_doubt: Array | None = None  # covariance (6, 6) of the mount's place (m) and turn (rad, apartment's axes)
+
+    def slack_deg(self, zoom: float) -> float:
+        """How far beside a place saved at this zoom the widest picture still shows all that was seen from there."""
+        if zoom < self.widest + 1.0:
+            return 0.0
+        known = at_level(self.levels, zoom)
+        times = LEAST_TIMES if known is None else max(1.0, known.times)
+        half = HALF_HEIGHT if self.lens is None else self.lens.height / 2 / self.lens.focal
+        return min(MOST_SLACK_DEG, degrees(atan(half) - atan(half / times)))
 
     def magnification(self, seen: Sighting) -> Magnification | None:
         """Of the picture of a sighting: measured, or by the table; None where neither tells it well enough."""

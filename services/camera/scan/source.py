@@ -34,7 +34,7 @@ SETTLE_S = 0.6  # from rest to the first snapshot: the picture's own delay
 OPENS_S = 6.0  # so long the first visit waits for the stream
 LOOK_S = 0.05  # between two looks whether pictures have come
 SURELY = 0.9  # of the quickest answer: no command turns the camera sooner after it was sent
-RECKONED_S = 0.8  # a drive of the firmware that was reckoned to end so much before it was seen to rest has done so
+RECKONED_S = 0.8  # a motion that was reckoned to end so much before it was read to rest has done so
 STOPS_S = 0.2  # after the stop of a zoom, until it stands
 T = TypeVar("T")
 TURNS = Start | GotoPreset | MoveTo | MoveOver
@@ -86,7 +86,6 @@ class Source:
         self._shot: list[tuple[Spot, float, bytes]] = []
         self._hopes_until = 0.0
         self.rested = 0.0  # from when on the camera has stood still, as its readings tell
-        self._ends = 0.0
         self._stood: Reading | None = None
 
     def begin(self, now: float) -> Plan[float]:
@@ -102,24 +101,26 @@ class Source:
         self._hopes_until = reply.received + OPENS_S
         return reply.received
 
-    def followed(self, plan: Plan[T], now: float, drive_s: float = 0.0) -> Plan[T]:
-        """A motion: notes when it begins, and from when on the camera stands (from `now`, if it does not move).
-
-        `drive_s` is what the firmware needs for it, where that drives.
-        """
+    def followed(self, plan: Plan[T], now: float) -> Plan[T]:
+        """A motion: notes when it begins, and from when on the camera stands (from `now`, if it does not move)."""
         answer: Any = None
         first = True
-        self.rested, self._ends, self._stood = now, 0.0, None
+        self.rested, self._stood = now, None
         try:
             while True:
                 step = plan.send(answer)
                 answer = yield step
                 if isinstance(answer, Reply) and answer.error is None:
-                    first = self._note(answer, drive_s, first=first)
+                    first = self._note(answer, first=first)
         except StopIteration as ended:
             return cast(T, ended.value)
         finally:
             plan.close()
+
+    def reckon(self, rests: float) -> None:
+        """The motion was reckoned to end a little before it was read to rest: so it did."""
+        if 0.0 < self.rested - rests < RECKONED_S:
+            self.rested = rests
 
     def expose(self, spot: Spot, now: float) -> Plan[float]:
         """At rest: the frames of a visit; returns when the camera may turn again."""
@@ -165,29 +166,26 @@ class Source:
         for visit, at, jpeg in self.stream.collect() if self.stream is not None else ():
             yield cast(Spot, visit), at, jpeg
 
-    def _note(self, reply: Reply, drive_s: float, *, first: bool) -> bool:
+    def _note(self, reply: Reply, *, first: bool) -> bool:
         request: Request = reply.request
         if isinstance(request, TURNS):
             if first and self.stream is not None:
                 self.stream.footage.leave(reply.sent + self._lead(), reply.received)
-            self._ends = reply.received + drive_s if first and not isinstance(request, Start) else 0.0
             self._stood = None
             return False
         if isinstance(request, Status):
             self._read(reply, cast(Reading, reply.result))
         elif isinstance(request, Stop):
-            self.rested, self._ends = reply.received + STOPS_S, 0.0
+            self.rested = reply.received + STOPS_S
         return first
 
     def _read(self, reply: Reply, reading: Reading) -> None:
-        """It stands since it first read as it does now; where the firmware drove, since that was reckoned to end."""
+        """It stands since it first read as it does now."""
         if self._stood is not None and same(self._stood, reading):
             return
         late = reply.received - reply.sent - self.skill.timing.usual
         seen = self.skill.paces[PAN].seen_at(reply.sent, late)
         self.rested = min(reply.received, max(reply.sent - STOPS_S, seen))
-        if 0.0 < self.rested - self._ends < RECKONED_S:
-            self.rested = self._ends
         self._stood = reading
 
     def _lead(self) -> float:

@@ -19,13 +19,13 @@ from services.camera.address import Address
 from services.camera.requests import Away, BadLogin, Refused
 from services.camera.video.pictures import Image
 from services.camera.video.session import Arrival
+from services.camera.video.timing import Held
 from services.errors import DeviceError
 
 if TYPE_CHECKING:
     Packet = av.Packet[av.VideoStream]
 
 OPEN_S, READ_S = 5.0, 4.0  # a stream that stands still is given up after READ_S
-LONGEST_GAP_S = 0.5  # between two pictures of a stream that runs
 LONGEST_BACKLOG = 32  # pictures that are decoded at once for a first look; with more the next keyframe is waited for
 LONGEST_GOP = 8 * 1024 * 1024  # bytes kept to begin with, when somebody starts to look between two keyframes
 OPTIONS = {
@@ -50,7 +50,7 @@ class Rtsp:
         context.flags |= av.codec.context.Flags.low_delay
         self._packets = self._container.demux(self._stream)
         self._gop: list[Packet] = []  # since the last keyframe
-        self._last: float | None = None  # stream time of the picture before
+        self._held = Held()
         self._kept = 0  # bytes of these
         self._decoded = 0  # so many of these are decoded
 
@@ -58,7 +58,7 @@ class Rtsp:
         """The next picture. `stream_s` is None for the first ones of some cameras."""
         packet = self._next()
         stream_s = None if packet.pts is None else float(packet.pts * packet.time_base)
-        arrived = self.clock() - self._held(stream_s)
+        arrived = self.clock() - self._held.take(stream_s)
         self._keep(packet)
         frame, broken = self._decode() if decode else (None, False)
         develop = None if frame is None else _developer(frame)
@@ -68,11 +68,6 @@ class Rtsp:
         """Ends the connection."""
         self._gop.clear()
         self._container.close()
-
-    def _held(self, stream_s: float | None) -> float:
-        """FFmpeg hands a picture on when the next one begins: it was here earlier by their distance, seconds."""
-        before, self._last = self._last, stream_s
-        return min(max(0.0, stream_s - before), LONGEST_GAP_S) if stream_s is not None and before is not None else 0.0
 
     def _next(self) -> Packet:
         try:

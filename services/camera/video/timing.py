@@ -7,12 +7,15 @@ from here and is a setting.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 DRIFT = 200e-6  # of cheap quartz: the fastest packet so far says less and less
 SETTLED_S = 2.0  # a camera may begin with old pictures: so long nothing is known of what is fast
 JUMP_S = 10.0  # between two packets: not a pause but another time base
 SMOOTH_S = 2.0  # of the lag that is told
+GAPS = 16  # distances between pictures that tell how near the next one may be
+LONGEST_GAP_S = 0.5  # between two pictures of a stream that runs
 QUEUE_S = 0.7  # a lag that stays above this is a queue that grows
 ADVICE = "the pictures arrive later and later: set the camera's bit rate below 2048 kb/s"
 
@@ -27,6 +30,26 @@ class Exposure:
     def after(self, moment: float) -> bool:
         """Whether the picture is surely from after that moment (the end of a move); if in doubt it is not."""
         return self.at - self.uncertainty > moment
+
+
+class Held:
+    """How long FFmpeg has held a picture when it hands it on, which it does when the next one begins.
+
+    How far away that one is is not known yet. It is taken to be as near as the nearest of late: a picture that seemed
+    to have come before it did would be the fastest one, and all others late.
+    """
+
+    def __init__(self) -> None:
+        self._last: float | None = None
+        self._gaps: deque[float] = deque(maxlen=GAPS)
+
+    def take(self, stream_s: float | None) -> float:
+        """Seconds that the picture with that time in the stream was held; 0 where nothing tells."""
+        before, self._last = self._last, stream_s
+        if stream_s is None or before is None:
+            return 0.0
+        self._gaps.append(min(max(0.0, stream_s - before), LONGEST_GAP_S))
+        return min(self._gaps)
 
 
 class StreamClock:

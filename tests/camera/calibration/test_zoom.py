@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from services.camera.calibration import levels
+from services.apartment import zoom_levels
 from services.camera.calibration.zoom import Visit, table
 from services.camera.service import CameraService
 from services.errors import ConfigError
@@ -77,7 +77,7 @@ def test_the_table_holds_every_level_s_focal_length_and_how_surely_and_is_in_use
     assert lens is not None
     assert last.values["zoom 4"][0] == pytest.approx(lens.focal * found[2].seen.times)
     assert last.file is not None
-    assert [level.zoom for level in levels.read(Path(last.file))] == [0, 2, 4, 6, 8]
+    assert [level.zoom for level in zoom_levels.read(Path(last.file))] == [0, 2, 4, 6, 8]
 
 
 def test_the_report_shows_what_each_visit_saw(learnt: Learnt) -> None:
@@ -117,22 +117,22 @@ def test_levels_that_scatter_are_unsure_and_those_that_do_not_are_sure() -> None
 
 
 def test_the_file_is_read_as_it_was_written(tmp_path: Path) -> None:
-    file = levels.of_lens(tmp_path / "ost.yaml")
-    assert levels.read(file) == ()
+    file = zoom_levels.of_lens(tmp_path / "ost.yaml")
+    assert zoom_levels.read(file) == ()
     table = (Level(0.0, WIDEST), Level(2.0, Magnification(1.5, 0.01, 0.001, -0.002)))
     lens = Lens.from_camera_info({
         "image_width": 2304, "image_height": 1296,
         "camera_matrix": {"data": [1000, 0, 1152, 0, 1000, 648, 0, 0, 1]},
         "distortion_coefficients": {"data": [0, 0, 0, 0, 0]},
     })  # fmt: skip
-    levels.write(file, table, lens)
-    assert levels.read(file) == table
+    zoom_levels.write(file, table, lens)
+    assert zoom_levels.read(file) == table
     assert "focal_px: 1500.0" in file.read_text()
-    assert at_level(levels.read(file), 2.0) == table[1].seen
+    assert at_level(zoom_levels.read(file), 2.0) == table[1].seen
 
 
 def test_a_wrong_file_is_told_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "zoom.yaml"
     file.write_text("levels:\n- zoom: 0\n  magnification: much\n  sigma: 0\n")
     with pytest.raises(ConfigError, match=r"zoom.yaml:3: levels\[0\].magnification: "):
-        levels.read(file)
+        zoom_levels.read(file)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from services.camera.scan.analysis import Analysed
+from services.camera.scan.findings import Frame
 from services.camera.scan.search import Scan
 from services.payloads import FINAL
 from tests.camera.scan.virtual_scan import Seer, VirtualScan, virtual_scan
@@ -92,6 +95,35 @@ def test_a_stream_that_stands_still_is_replaced_by_snapshots(trial: VirtualScan)
     scan, _, last = trial.run(ORDER, once(lambda scan: len(scan.findings.taken) >= 6, freeze))
     assert (last.state, last.frames_analysed) == ("done", WHOLE)
     assert all(sum(spot.got for spot in scan.spots if spot.place == place) == 8 for place in PLACES)
+
+
+def test_frames_of_a_visit_that_was_broken_off_are_looked_at_all_the_same(tmp_path: Path) -> None:
+    """They are with those who look when the camera goes away; what is seen in them is kept, and its picture."""
+    with virtual_scan(tmp_path, scan_pictures="snapshot") as trial:
+        sofa, scanner = trial.places["Sofa"], trial.service.scanner
+        trial.sees({582: (sofa.pan, sofa.tilt)})
+        late: list[Analysed] = []
+        take = scanner.take
+        scanner.take = late.append  # type: ignore[method-assign]
+
+        def away() -> None:
+            trial.inside.device.boots_until = trial.flat.now + 30.0
+
+        def broken_off(scan: Scan) -> list[Frame]:
+            return [one for one in scan.findings.taken if one.spot not in scan.spots]
+
+        goes = once(lambda scan: bool(scan.spots) and scan.spots[-1].got == 2, away)
+
+        def each(scan: Scan) -> None:
+            goes(scan)
+            if broken_off(scan):
+                scanner.take = take  # type: ignore[method-assign]
+                while late:
+                    take(replace(late.pop(0), jpeg=b"a picture"))
+
+        scan, _, last = trial.run(json.dumps({"full": True, "places": PLACES, "targets": [582]}), each)
+        assert broken_off(scan)
+        assert (last.state, last.found) == ("done", [582])
 
 
 def test_places_whose_frames_are_broken_are_visited_once_more(trial: VirtualScan) -> None:

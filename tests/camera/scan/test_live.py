@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
+from threading import Event
+from threading import enumerate as threads
 from types import SimpleNamespace
 from typing import Any, cast
 
 import cv2
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from services.camera.scan.footage import Visit
@@ -80,3 +83,30 @@ def test_a_turn_that_nobody_looked_at_ends_what_was_seen_before() -> None:
     assert any(visit is first for visit, _, _ in given)
     for visit, _, jpeg in given:
         assert likeness(here if visit is first else there, thumb(pictures.decode(jpeg))) == "same"
+
+
+def test_a_picture_that_is_developed_late_is_none_of_the_next_scan(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream, begun, may, made = Streamed(), Event(), Event(), Event()
+    encode = pictures.encode
+
+    def slowly(image: Picture, quality: int) -> bytes:
+        begun.set()
+        assert may.wait(10)
+        try:
+            return encode(image, quality)
+        finally:
+            made.set()
+
+    monkeypatch.setattr(pictures, "encode", slowly)
+    stream.live.begin(None)
+    stream.live.footage.open(Visit(wanted=3, since=stream.now))
+    for _ in range(8):
+        stream.show(1)
+        assert stream.live.collect() == []
+    assert begun.wait(10)
+    stream.live.begin(None)
+    may.set()
+    assert made.wait(10)
+    wait_until(lambda: not [one for one in threads() if one.name.startswith("scan pictures")], "the darkroom's end", 10)
+    assert stream.live.collect() == []
+    stream.live.close()

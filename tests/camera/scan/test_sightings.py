@@ -54,6 +54,23 @@ def off_mm(result: ScanResult, marker: Print) -> float:
     return 1000 * float(np.linalg.norm(place(result) - marker.pose.translation))
 
 
+@pytest.mark.parametrize(
+    ("eye", "zoom", "degrees"),
+    [
+        (EYE, 0.0, 0.0),
+        (EYE, 0.5, 0.0),  # hardly zoomed, if at all
+        (EYE, 2.0, 2.2),
+        (replace(EYE, lens=None), 2.0, 2.3),
+        (replace(EYE, levels=(Level(2.0, Magnification(1.05, 0.0)), Level(4.0, Magnification(2.0, 0.0)))), 2.0, 1.1),
+        (replace(EYE, levels=(Level(2.0, Magnification(1.05, 0.0)), Level(4.0, Magnification(2.0, 0.0)))), 4.0, 3.0),
+    ],
+)
+def test_beside_a_place_that_was_saved_zoomed_the_widest_picture_shows_it_whole(
+    eye: Eye, zoom: float, degrees: float
+) -> None:
+    assert eye.slack_deg(zoom) == pytest.approx(degrees, abs=0.2)
+
+
 def test_what_is_seen_is_published_with_place_time_and_number_of_frames() -> None:
     marker = ahead(HERE)
     (result,) = said(seen(marker))

@@ -40,6 +40,23 @@ def test_a_full_scan_takes_little_more_than_motors_and_frames_need_and_looks_at_
     assert min(factors) >= bounds.SCAN_QUICKER, factors
 
 
+def test_a_place_that_was_saved_zoomed_is_shown_whole_and_costs_no_correction(trial: VirtualScan) -> None:
+    trial.sees({})
+    zoomed = {"Dining": 2.0, "Window": 8.0}
+    named = trial.service.places.named
+    for place, zoom in zoomed.items():
+        named[place] = named[place].model_copy(update={"zoom": zoom, "preset": None})
+    trial.run('{"full": true}')
+    least = trial.least(turns=2)
+    scan, seconds, last = trial.run('{"full": true}')
+    assert (last.state, last.frames_analysed) == ("done", EVERY)
+    assert seconds / least.seconds <= bounds.SCAN_OVER_LEAST
+    for spot in scan.spots:
+        place, slack = named[spot.place], 3.0 if spot.place in zoomed else 0.5
+        assert max(abs(spot.reading.pan - place.pan), abs(spot.reading.tilt - place.tilt)) <= slack, spot.place
+        assert spot.reading.zoom == 0.0
+
+
 def test_a_target_is_seen_in_a_quarter_of_the_time_that_the_report_s_scan_needs(trial: VirtualScan) -> None:
     markers = {number: (place.pan, place.tilt) for number, place in enumerate(trial.places.values(), 1)}
     trial.sees(markers)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import random
+from itertools import pairwise
 
 import pytest
 
-from services.camera.video.timing import Exposure, StreamClock
+from services.camera.video.timing import Exposure, Held, StreamClock
 
 LATENCY_S, UNSURE_S, STEP_S = 0.3, 0.1, 1 / 15
 
@@ -27,6 +28,18 @@ def test_the_fastest_packets_tell_the_relation_and_waiting_ones_do_not_move_it()
         exposure = relation.take(stream_s, 1000 + stream_s + LATENCY_S + jitter.expovariate(10))
         assert abs(exposure.at - (1000 + stream_s)) < 0.01
         assert exposure.uncertainty == UNSURE_S
+
+
+def test_pictures_of_an_unsteady_camera_do_not_seem_to_have_come_before_they_did() -> None:
+    """FFmpeg hands each one on when the next begins, however far that is from it."""
+    relation, held, rng = StreamClock(0.0, UNSURE_S), Held(), random.Random(3)
+    times = [0.0]
+    for number in range(600):
+        times.append(times[-1] + (STEP_S if number < 60 or rng.random() < 0.7 else rng.uniform(0.04, 0.3)))
+    for number, (stream_s, following) in enumerate(pairwise(times)):
+        exposure = relation.take(stream_s, 1000 + following - held.take(stream_s))
+        if number > 60:
+            assert abs(exposure.at - (1000 + stream_s)) < 0.03
 
 
 def test_pictures_that_arrive_later_and_later_are_a_queue_and_keep_their_time_of_exposure() -> None:
