@@ -1,7 +1,7 @@
 """The node over rospy: topics made on a thread of their own, and registered again at every new ROS master.
 
-rospy's traps are met here, each where it bites: registration (`services/ros_master.py`), Python's logging
-(`services/ros_node.py`), the lock of a publisher's buffer, the queue of a new subscriber. Not here: what a message
+rospy's traps are met here, each where it bites: registration (`services/ros/master.py`), Python's logging
+(`services/ros/node.py`), the writing of what is published (`outgoing.py`). Not here: what a message
 means (`rules.py`, `messages.py`).
 """
 
@@ -16,15 +16,16 @@ import time
 from functools import partial
 from typing import Any
 
-from services import ros_node
 from services.bridge import arguments, definitions, messages, reach
+from services.bridge.doubled import doubled
 from services.bridge.node import ANY, CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Server
 from services.bridge.outgoing import Outgoing
 from services.bridge.rules import Fields
 from services.bridge.simtime import SimulatedTime
 from services.bus import Message
 from services.errors import ConfigError, Unavailable
-from services.ros_master import Master, register, rival
+from services.ros import node as ros_node
+from services.ros.master import Master, register, rival
 from services.runner import Post
 
 POLL_S = 0.5  # of the master's pid; a new master knows us again within this time and some milliseconds
@@ -56,14 +57,7 @@ class RosNode:
         self._ports = ports
         self._outlets = {outlet.topic: outlet for outlet in ports.outlets}
         self._classes = {outlet.topic: _class(outlet) for outlet in ports.outlets}
-        ends = (
-            OSError,
-            ValueError,
-            AttributeError,
-            self._rospy.ROSException,
-            self._rospy.exceptions.ROSInternalException,
-        )
-        self._outgoing = {outlet.topic: Outgoing(ends) for outlet in ports.outlets}
+        self._outgoing = {outlet.topic: Outgoing(outlet.queue) for outlet in ports.outlets}
         self._post = post
         self._clock = SimulatedTime(self._rospy)
         self._opened = False
@@ -165,6 +159,7 @@ class RosNode:
         publisher = self._rospy.Publisher(
             outlet.topic, self._classes[outlet.topic], tcp_nodelay=True, latch=outlet.latch, queue_size=outlet.queue
         )
+        publisher.impl.set_queue_size(None)  # no thread of rospy between us and the connection
         outgoing.attach(publisher.impl)
         publisher.impl.add_subscriber_listener(outgoing)
 
@@ -179,6 +174,8 @@ class RosNode:
 
     def _heard(self, message: Any, topic: str) -> None:
         """On rospy's threads, one per publisher."""
+        if doubled(message):
+            return
         if isinstance(message, self._rospy.AnyMsg):
             message = definitions.decoded(message._buff, message._connection_header)
         if message is None:

@@ -67,6 +67,50 @@ def test_a_new_subscriber_gets_every_state_and_then_what_happens(master: ros.Mas
         assert echo.rest()[-1] == ("Number_0", "21.5")
 
 
+SAYINGS = """
+import sys, threading, rospy
+from diagnostic_msgs.msg import KeyValue
+
+class Greeting(rospy.SubscribeListener):
+    def peer_subscribe(self, topic, say_to_all, say_to_it):
+        say_to_it(KeyValue("Dimmer", "INCREASE"))
+        greeted.set()
+
+greeted = threading.Event()
+latching = sys.argv[1] == "latching"
+rospy.init_node("robot", anonymous=True)
+robot = rospy.Publisher("/iot_command", KeyValue, Greeting(), latch=latching, queue_size=9)
+greeted.wait(20.0)
+while robot.impl.seq < 1 + latching:  # rospy says it again; from here on it holds its lock
+    rospy.sleep(0.01)
+for value in sys.argv[2:]:
+    robot.publish(KeyValue("Dimmer", value))
+rospy.sleep(1.0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "commands"),
+    [
+        ("latching", ["ON"], ["INCREASE", "ON"]),
+        ("latching", ["INCREASE", "INCREASE", "ON"], ["INCREASE", "INCREASE", "INCREASE", "ON"]),
+        ("plain", ["INCREASE", "ON"], ["INCREASE", "INCREASE", "ON"]),
+    ],
+)
+def test_the_first_word_that_rospy_says_twice_is_done_once(
+    kind: str, words: list[str], commands: list[str], master: ros.Master, run_bridge: Run
+) -> None:
+    """Who speaks while it is being subscribed to, and latches, says that word twice by rospy's own doing."""
+    bridge = run_bridge(master.env, {"Dimmer": {"type": "Dimmer", "label": "A light"}})
+    bridge.registers(1)
+    subprocess.run(
+        ["/usr/bin/python3", "-c", SAYINGS, kind, *words], env={**os.environ, **master.env}, check=True,
+        timeout=PATIENCE_S,
+    )  # fmt: skip
+    bridge.says("home/Dimmer/command", lambda text: text == "ON")
+    assert [text for _, topic, text in bridge.said if topic == "home/Dimmer/command"] == commands
+
+
 def test_our_log_is_still_ours_when_the_node_is_up(master: ros.Master, run_bridge: Run) -> None:
     bridge = run_bridge(master.env, LAMP)
     bridge.registers(1)
