@@ -1,4 +1,4 @@
-"""Health on both sides: every `diagnostics/#` as one DiagnosticArray, and the bridge's own `diagnostics/bridge`."""
+"""Health on both sides: every `diagnostics/#` as a DiagnosticStatus, and the bridge's own `diagnostics/bridge`."""
 
 from __future__ import annotations
 
@@ -50,10 +50,9 @@ class Health:
         values |= {name: str(count) for name, count in counters.items()}
         return Diagnostic(level=level, message=text[:400], values=values, hardware_id="bridge")
 
-    def array(self, now: float, more: list[Fields]) -> Fields:
-        """A DiagnosticArray, with `more` statuses of the parts; what has been silent for a while is stale."""
-        heard = [_status(component, news, now) for component, news in sorted(self._news.items())]
-        return {"header": {"stamp": now}, "status": [*heard, *more]}
+    def statuses(self, now: float) -> list[Fields]:
+        """A DiagnosticStatus of each component; what has been silent for a while is stale."""
+        return [_status(component, news, now) for component, news in sorted(self._news.items())]
 
 
 def _status(component: str, news: News, now: float) -> Fields:

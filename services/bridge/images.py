@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from services.bridge.rules import Fields
 from services.errors import BadMessage
 from services.vision.lens import Lens
+from services.vision.zoom import WIDEST, Level, at_level
 
 SIZES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # segments of a JPEG that begin with its size (SOF)
-ZOOMED = 0.01  # a zoom level above this shows another part than was calibrated
+ZOOMED = 0.01  # a zoom level above this shows another part than the lens was calibrated with
+VIEWS = 100  # sizes and zooms whose lens is remembered
 
 
 def one_thread() -> None:
@@ -52,25 +54,25 @@ def size(jpeg: bytes) -> tuple[int, int]:
 
 
 class Intrinsics:
-    """The lens of one camera, from what camera_calibration writes; scaled to the pictures that come."""
+    """The lens of one camera, from what camera_calibration writes; scaled and zoomed as the pictures that come."""
 
-    def __init__(self, content: Mapping[str, Any] | None) -> None:
-        """ValueError when it is no calibration; None: there is none."""
-        self._content = content
+    def __init__(self, content: Mapping[str, Any] | None, levels: Sequence[Level] = ()) -> None:
+        """ValueError when it is no calibration; None: there is none. `levels`: the calibrated zoom."""
+        self._content, self._levels = content, levels
         self._lens = None if content is None else Lens.from_camera_info(content)
-        self._scaled = cache(self._at)
+        self._scaled = lru_cache(VIEWS)(self._at)
 
     def info(self, width: int, height: int, zoom: float, header: Fields) -> Fields:
         """A sensor_msgs/CameraInfo. As ROS has it, an uncalibrated one is all zeros: without a calibration, for a
-        picture of another shape, and at a zoom for which it does not hold."""
-        known = self._scaled(width, height) if zoom <= ZOOMED else {}
-        return {"header": header, "width": width, "height": height, **known}
+        picture of another shape, and at a zoom of which is not known how much it magnifies."""
+        return {"header": header, "width": width, "height": height, **self._scaled(width, height, zoom)}
 
-    def _at(self, width: int, height: int) -> Fields:
-        if self._lens is None or self._content is None:
+    def _at(self, width: int, height: int, zoom: float) -> Fields:
+        magnification = WIDEST if zoom <= ZOOMED else at_level(self._levels, zoom)
+        if self._lens is None or self._content is None or magnification is None:
             return {}
         try:
-            lens = self._lens.scaled(width, height)
+            lens = magnification.through(self._lens.scaled(width, height))
         except ValueError:
             return {}
         matrix = [float(number) for number in lens.matrix.ravel()]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from services import topics
+from services.apartment.home import Home
 from services.bridge.part import Part, status
 from services.bridge.rules import Fields, Heard
-from services.home import Home
 
 OK, WARN, STALE = 0, 1, 3
 NOTHING = ("UNDEF", "NULL")

@@ -1,11 +1,11 @@
-"""The floor plan that map_server's YAML names, as a nav_msgs/OccupancyGrid. It is read in `services/floor.py`."""
+"""The floor plan that map_server's YAML names, as a nav_msgs/OccupancyGrid. Read in `apartment/floor.py`."""
 
 from __future__ import annotations
 
 from math import cos, sin
 from pathlib import Path
 
-from services import floor
+from services.apartment import floor
 from services.bridge.rules import Fields
 
 

@@ -11,7 +11,7 @@ from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard
 from services.bus import Message
 from services.errors import BadMessage
-from services.robot_payloads import MissionOrder, MissionState
+from services.payloads.robot import MissionOrder, MissionState
 
 ORDER, STATE, CANCEL = "/iot_mission", "/iot_mission/state", "/iot_mission/cancel"
 KEY_VALUE = "diagnostic_msgs/KeyValue"

@@ -8,7 +8,9 @@ from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 
-from services import __version__, robot_places
+from services import __version__
+from services.apartment import robot_places
+from services.apartment.robot_places import Relation
 from services.bridge import arguments, mapfile, messages, robots, rulebook
 from services.bridge.confirm import Confirm
 from services.bridge.hatch import Wanted
@@ -27,7 +29,6 @@ from services.bridge.simulated import SimulatedNode
 from services.bridge.snapshots import Snapshots
 from services.bridge.tree import Tree
 from services.errors import ConfigError
-from services.robot_places import Relation
 from services.runner import Post
 
 

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
 from services import states, topics
+from services.apartment.home import Home, Item
 from services.bridge import limits, rulebook
 from services.bridge.health import Health
 from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Node
@@ -20,10 +21,11 @@ from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard, Rule, read, to_mqtt, to_ros
 from services.bus import LOST_TOPIC, Message, topic_matches
 from services.errors import ApartmentError, BadMessage
-from services.home import Home, Item
 from services.payloads import Diagnostic
 
 DIAGNOSTICS_EVERY_S = 1.0
+TOLD_AT_ONCE = 50  # statuses: a millisecond, in which nothing else goes on
+NEXT_S = 0.02  # until the next ones
 SOONEST_S = 0.2  # between two diagnostics of our own, however much is refused
 REFRESH = ("ROS_COMMAND", b"REFRESH")  # key and value with which a robot asks for all states once more
 REMEMBERED_TOPICS = 10_000  # whose rules are found at once
@@ -60,7 +62,8 @@ class Bridge:
         self._rules_for = lru_cache(REMEMBERED_TOPICS)(self._find_rules)
         self._health = Health()
         self._own_due = 0.0
-        self._next_array = self._last_own = 0.0
+        self._untold: list[Fields] = []  # statuses that are still to be said in this second
+        self._next_array = self._next_statuses = self._last_own = 0.0
 
     @property
     def due(self) -> float:
@@ -92,13 +95,20 @@ class Bridge:
         for part in self.parts:
             yield from part.tick(self.node, now)
         if now >= self._next_array:
-            self._next_array = now + DIAGNOSTICS_EVERY_S
-            array = self._health.array(now, [one for part in self.parts for one in part.statuses(now)])
-            self.node.publish(rulebook.DIAGNOSTICS, array)
+            self._tell_statuses(now)
         if now >= self._own_due:
-            self._last_own, self._own_due = now, self._next_array
+            self._last_own, self._own_due = now, now + DIAGNOSTICS_EVERY_S
             yield topics.DIAGNOSTICS.message(self._health.own(now, self.counters), component="bridge")
         self.node.flush()
+
+    def _tell_statuses(self, now: float) -> None:
+        """Each once a second, some at a time."""
+        if not self._untold:
+            self._untold = [*self._health.statuses(now), *(one for part in self.parts for one in part.statuses(now))]
+            self._next_statuses = now + DIAGNOSTICS_EVERY_S
+        told, self._untold = self._untold[:TOLD_AT_ONCE], self._untold[TOLD_AT_ONCE:]
+        self.node.publish(rulebook.DIAGNOSTICS, {"header": {"stamp": now}, "status": told})
+        self._next_array = now + NEXT_S if self._untold else self._next_statuses
 
     def _linked(self, link: Link) -> None:
         if link.up != self._health.link.up:

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 from pydantic import Field, field_validator
 
+from services.apartment.cameras import CameraSections
+from services.apartment.home import Home
 from services.bridge.robots import Robot
-from services.camera_sections import CameraSections
-from services.home import Home
 from services.section import Section
 from services.topic import LEVELS
 

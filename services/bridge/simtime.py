@@ -11,7 +11,7 @@ import time
 from typing import Any
 
 from services.errors import Unavailable
-from services.ros_master import Master
+from services.ros.master import Master
 
 PARAMETER = "/use_sim_time"
 TOPIC = "/clock"

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from services import topics
+from services.apartment.robot_places import Relation
 from services.bridge import frames
 from services.bridge.node import Node, Outlet, Ports
 from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard
 from services.bus import Message
 from services.payloads import CameraStatus, Position, ScanResult, seconds
-from services.robot_places import Relation
 from services.vision.frames import Mount
 
 TF, TF_STATIC, JOINTS = "/tf", "/tf_static", "/joint_states"

@@ -16,6 +16,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from services import document
+from services.apartment import zoom_levels
 from services.bridge import images
 from services.bridge.hatch import BASE
 from services.bridge.images import Intrinsics
@@ -41,7 +42,7 @@ class Viewer:
         self.shown = self.decoded = 0
         self.zoom = 0.0
         self._camera_info = camera_info
-        self._read: tuple[float, Intrinsics] | None = None
+        self._read: tuple[list[float], Intrinsics] | None = None
         self._node = node
         self._url = ""
         self._changed = threading.Event()
@@ -103,13 +104,11 @@ class Viewer:
         node.flush()
 
     def _intrinsics(self) -> Intrinsics:
-        """As they stand in the file now: who calibrates need not start us again."""
-        changed = 0.0
-        if self._camera_info is not None:
-            with suppress(OSError):
-                changed = self._camera_info.stat().st_mtime
+        """As they stand in the files now: who calibrates need not start us again."""
+        file = self._camera_info
+        changed = [] if file is None else [_changed(one) for one in (file, zoom_levels.of_lens(file))]
         if self._read is None or self._read[0] != changed:
-            self._read = (changed, _intrinsics(self._camera_info if changed else None))
+            self._read = (changed, _intrinsics(file if any(changed[:1]) else None))
         return self._read[1]
 
 
@@ -141,11 +140,18 @@ def pictures(url: str, wanted: Callable[[], bool]) -> Iterator[Shown]:
             yield from list(parts.feed(data))[-1:]
 
 
+def _changed(file: Path) -> float:
+    """When; 0 where it is not there."""
+    with suppress(OSError):
+        return file.stat().st_mtime
+    return 0.0
+
+
 def _intrinsics(file: Path | None) -> Intrinsics:
     if file is None:
         return Intrinsics(None)
     try:
-        return Intrinsics(document.must(document.read(file)))
+        return Intrinsics(document.must(document.read(file)), zoom_levels.read(zoom_levels.of_lens(file)))
     except (ConfigError, ValueError) as error:
         log.warning("%s: %s", file, error)
         return Intrinsics(None)

@@ -123,7 +123,8 @@ def hear_ros(topic: str, count: int) -> None:
 
 
 def connected(end: Any) -> None:
-    while end.get_num_connections() == 0:
+    """Waits for the other end. A subscriber counts those that it has only begun to call: it must have their answer."""
+    while not any(one.type or one.direction == "o" for one in end.impl.connections):
         threading.Event().wait(0.05)
 
 
@@ -184,7 +185,7 @@ def loop_to_ros(port: int, mqtt: str, topic: str, qos: int) -> None:
 
     rospy = ros("loop")
     publisher = rospy.Publisher(topic, KeyValue, tcp_nodelay=True, queue_size=20_000)
-    client = mqtt_client(port, "loop")
+    client = mqtt_client(port, "loop-to-ros")
 
     def pass_on(_client: Any, _data: Any, message: Any) -> None:
         publisher.publish(message.topic.split("/")[1], message.payload.decode())
@@ -201,7 +202,7 @@ def loop_to_mqtt(port: int, topic: str, qos: int) -> None:
     from diagnostic_msgs.msg import KeyValue
 
     rospy = ros("loop")
-    client = mqtt_client(port, "loop")
+    client = mqtt_client(port, "loop-to-mqtt")
     client.loop_start()
     rospy.Subscriber(
         topic, KeyValue, lambda message: client.publish(f"flat/{qos}/{message.key}", message.value, qos=qos),
@@ -212,7 +213,7 @@ def loop_to_mqtt(port: int, topic: str, qos: int) -> None:
 
 
 def traffic(out: str, back: str, keys: list[str], rate: float) -> None:
-    """Says numbers for ever, and tells a few times a second which it has said, with when, and what it has heard."""
+    """Once it is let, says numbers for ever; tells a few times a second which it said, with when, and what it heard."""
     from diagnostic_msgs.msg import KeyValue
 
     rospy, lock = ros("traffic"), threading.Lock()
@@ -228,6 +229,7 @@ def traffic(out: str, back: str, keys: list[str], rate: float) -> None:
     connected(subscriber)
     connected(publisher)
     tell("READY")
+    sys.stdin.readline()
     began, number = time.monotonic(), 0
     while True:
         threading.Event().wait(0.2)

@@ -13,6 +13,7 @@ from services.bridge.images import Intrinsics, image, size
 from services.bridge.mapfile import load
 from services.bridge.multipart import Multipart
 from services.errors import BadMessage, ConfigError
+from services.vision.zoom import WIDEST, Level, Magnification
 from tests.bridge.test_service import CONFIG
 
 HEADER = {"stamp": 1.0, "frame_id": "ip1_optical_frame"}
@@ -77,6 +78,18 @@ def test_the_lens_is_scaled_to_the_picture_that_comes() -> None:
     assert info["K"][2] == pytest.approx((573.35 + 0.5) / 2 - 0.5)
     assert info["P"][:3] == info["K"][:3]
     assert (info["distortion_model"], len(info["D"]), len(info["P"])) == ("plumb_bob", 5, 12)
+
+
+def test_a_zoomed_lens_is_known_between_the_levels_that_were_calibrated() -> None:
+    levels = (Level(0.0, WIDEST), Level(4.0, Magnification(2.0, 0.001, 0.01, 0.0)))
+    lens = Intrinsics(document.read(CONFIG / "ip1" / "ost.yaml").value, levels)
+    wide, zoomed = (lens.info(1152, 648, zoom, HEADER) for zoom in (0.0, 4.0))
+    middle = (1152 - 1) / 2
+    assert zoomed["K"][0] == pytest.approx(2 * wide["K"][0])
+    assert zoomed["K"][2] == pytest.approx(2 * (wide["K"][2] - middle) + middle + 0.01 * 1152)
+    assert (zoomed["P"][:3], zoomed["D"]) == (zoomed["K"][:3], wide["D"])
+    assert lens.info(1152, 648, 2.0, HEADER)["K"][0] == pytest.approx(1.5 * wide["K"][0])
+    assert "K" not in lens.info(1152, 648, 6.0, HEADER)
 
 
 @pytest.mark.parametrize(("width", "height", "zoom"), [(640, 480, 0.0), (1152, 648, 2.0)])

@@ -22,9 +22,9 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
+from services.apartment.home import Home
 from services.client import Client, connected
 from services.config import BusSettings
-from services.home import Home
 from services.payloads import stamp
 from services.peers import end, mosquitto, ros, wait_until
 from tests.bridge import patterns

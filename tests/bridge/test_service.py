@@ -238,6 +238,24 @@ def test_motion_is_a_status_with_its_value(bridge: Driven, value: int, level: in
     )  # fmt: skip
 
 
+def test_many_statuses_are_said_some_at_a_time_and_each_once_a_second(bridge: Driven) -> None:
+    for number in range(120):
+        bridge.hears(f"diagnostics/service/s{number}", {"level": 0, "message": "ok"}, NOW)
+    bridge.node.published.clear()
+    said: list[tuple[float, list[str]]] = []
+    now = NOW + 1.0
+    while now < NOW + 3.0:
+        list(bridge.service.tick(now))
+        said += [(now, [one["name"] for one in fields["status"]]) for _, fields in bridge.node.published]
+        bridge.node.published.clear()
+        assert bridge.service.due is not None
+        now = max(bridge.service.due, now + 0.001)
+    assert max(len(names) for _, names in said) == 50
+    times = [at for at, names in said if "service: s7" in names]
+    assert [at - times[0] for at in times] == pytest.approx([0.0, 1.0])
+    assert sum("service: s119" in names for _, names in said) == 2
+
+
 def test_diagnostics_are_one_array_a_second_and_turn_stale(bridge: Driven) -> None:
     bridge.hears(
         "diagnostics/camera/ip1", {"level": 1, "message": "slow", "values": {"fps": "3"}, "hardware_id": "ip1"}

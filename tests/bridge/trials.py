@@ -77,13 +77,16 @@ class Traffic:
     _client: paho.Client | None = None
 
     def start(self, ears: bench.Part) -> list[threading.Thread]:
-        """Begins to say and to hear."""
+        """Begins to say and to hear; ROS says nothing before somebody on MQTT hears it."""
+        subscribed = threading.Event()
         self._client = client = mqtt_client(self.lab.port, "traffic")
         client.reconnect_delay_set(1, 1)
         client.on_connect = lambda *_: client.subscribe("home/+/set", qos=1)
         client.on_message = lambda _c, _d, message: self.to_mqtt.takes(int(message.payload))
-        client.subscribe("home/+/set", qos=1)
+        client.on_subscribe = lambda *_: subscribed.set()
         client.loop_start()
+        assert subscribed.wait(PATIENCE_S)
+        ears.go()
         threads = [threading.Thread(target=self._say), threading.Thread(target=self._hear, args=(ears,))]
         for thread in threads:
             thread.start()

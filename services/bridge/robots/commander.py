@@ -6,7 +6,7 @@ goal is somebody's who has no life on the bus.
 
 from __future__ import annotations
 
-from services.robot_payloads import MissionState
+from services.payloads.robot import MissionState
 
 SERVICE = "mission"
 GONE_S = 15.0  # a service that was killed is back within three

@@ -15,7 +15,7 @@ from services.bridge.robots import chain
 from services.bridge.rules import Fields
 from services.errors import BadMessage
 from services.payloads import Point
-from services.robot_payloads import SeenMarker
+from services.payloads.robot import SeenMarker
 from services.vision.detect import Detection, Picture, detect
 from services.vision.frames import Array, Transform
 from services.vision.lens import Lens

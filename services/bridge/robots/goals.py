@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 from services.bridge.robots.actions import ENDED, ONGOING, Action
 from services.bridge.rules import Fields
-from services.robot_payloads import GotoResult
+from services.payloads.robot import GotoResult
 
 AGAIN_S = 1.0  # between two sendings of a goal that the server has not named
 TAKEN_S = 4.0  # until it must have; who ordered it waits 5 s before he orders it again

@@ -26,7 +26,7 @@ from services.bridge.rules import Fields
 from services.bus import Message
 from services.errors import BadMessage
 from services.payloads import stamp
-from services.robot_payloads import RobotPose, RobotSeen, SeenMarker
+from services.payloads.robot import RobotPose, RobotSeen, SeenMarker
 from services.vision.frames import Transform
 
 TF, TF_STATIC = "/tf", "/tf_static"

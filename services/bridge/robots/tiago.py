@@ -27,11 +27,11 @@ from services.bridge.robots.kept import Kept
 from services.bridge.robots.pipe import Felt, UnderWay, Wanted
 from services.bridge.rules import Fields, Heard
 from services.bus import Message
-from services.robot_payloads import GotoResult, MissionState, RobotCancel, RobotGoto, RobotPose, RobotSeen
+from services.payloads.robot import GotoResult, MissionState, RobotCancel, RobotGoto, RobotPose, RobotSeen
 from services.section import Section
 
 if TYPE_CHECKING:
-    from services.robot_places import RobotPlaces
+    from services.apartment.robot_places import RobotPlaces
 
 EVERY_S = 0.1  # between two looks at what the senses say
 WELL_S = 5.0  # poses and pictures that are older are a fault
@@ -77,7 +77,7 @@ class Settings(Section):
 
 def check(settings: Section, folder: Path) -> None:
     """Reads the robot's places; ConfigError tells their faults."""
-    from services import robot_places  # maps and pictures are for who runs the bridge, settings for everybody
+    from services.apartment import robot_places  # maps and pictures are for who runs the bridge, settings for everybody
 
     assert isinstance(settings, Settings)
     if settings.places is not None:
@@ -86,7 +86,7 @@ def check(settings: Section, folder: Path) -> None:
 
 def part(robot: str, settings: Section, where: Where) -> Tiago:
     """See `robots/__init__`; ConfigError when its places cannot be read."""
-    from services import robot_places
+    from services.apartment import robot_places
 
     assert isinstance(settings, Settings)
     given = settings.places

@@ -16,7 +16,7 @@ from services.bridge.robots.pipe import Wanted
 from services.bridge.robots.senses import OLD_S, Senses, ports
 from services.bus import Message
 from services.errors import BadMessage
-from services.robot_payloads import RobotPose, RobotSeen
+from services.payloads.robot import RobotPose, RobotSeen
 from services.simulators.robot import eye
 from services.simulators.world import load
 from services.vision.frames import Transform, quaternion, rotation_z

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from services.apartment.robot_places import PointPose, RobotPlaces
 from services.bridge import Config
 from services.bridge.program import check
 from services.bridge.robots import kinds
@@ -23,7 +24,6 @@ from services.bridge.service import Bridge
 from services.bridge.simulated import SimulatedNode
 from services.bus import LOST_TOPIC, Message
 from services.errors import ConfigError
-from services.robot_places import PointPose, RobotPlaces
 from services.vision.codes import DICTIONARIES
 from tests.bridge.test_service import CONFIG, HOME, NOW
 
