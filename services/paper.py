@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from services.floor import XY
+from services.apartment.floor import XY
 
 SCALE = 2  # pixels of the file per unit of the sheet, for screens that show fine print
 FINE = 4  # bits behind the point of a coordinate

@@ -26,49 +26,50 @@ CORE = (
     *WORDS,
     "services.payloads",
     "services.bus",
-    "services.robot_payloads",
-    "services.history_payloads",
     "services.topic",
     "services.topics",
-    "services.home",
+    "services.apartment.home",
     "services.whole_file",
+    "services.memory",
 )
 FILES_OF_OURS = ("services.document", "services.secret_store")  # reading YAML, finding secrets
 SHELL = ("services.config", "services.registry", "services.runner", "services.aside", "services.process")
 BUSES = ("services.bus.mqtt", "services.bus.memory", "services.bus.connection", "services.bus.outbox")
-THE_FLAT = ("services.vision", "services.floor", "services.robot_places")  # where what is
-ROS_GRAPH = ("services.ros_master", "services.ros_node")
+THE_FLAT = (
+    "services.vision",
+    "services.apartment.floor",
+    "services.apartment.robot_places",
+    "services.apartment.zoom_levels",
+)  # where what is
 SERVICE = (*CORE, "services.runner", "services.document")  # they meet on the bus, never in an import
 LAYERS: dict[str, tuple[str, ...]] = {
     "services": (),
     "services.errors": (),
     "services.whole_file": (),
+    "services.memory": (),
     "services.section": ("services.errors",),
     "services.states": ("services.errors",),
     "services.payloads": ("services.errors",),
     "services.bus": ("services.errors",),
-    "services.home": WORDS,
-    "services.robot_payloads": ("services.errors", "services.payloads"),
-    "services.history_payloads": ("services.errors", "services.payloads", "services.robot_payloads"),
-    "services.floor": (*WORDS, "services.document"),
-    "services.robot_places": (*WORDS, "services.document", "services.floor"),
-    "services.paper": ("services.errors", "services.floor"),
-    "services.camera_sections": ("services.section", "services.vision"),
+    "services.apartment": (),
+    "services.apartment.home": WORDS,
+    "services.apartment.floor": (*WORDS, "services.document"),
+    "services.apartment.robot_places": (*WORDS, "services.document", "services.apartment.floor"),
+    "services.apartment.zoom_levels": (*WORDS, "services.document", "services.vision"),
+    "services.paper": ("services.errors", "services.apartment.floor"),
+    "services.apartment.cameras": ("services.section", "services.vision"),
     "services.topic": (*WORDS, "services.bus", "services.payloads"),
     "services.topics": (
         *WORDS,
         "services.bus",
         "services.payloads",
-        "services.robot_payloads",
-        "services.history_payloads",
         "services.topic",
     ),
     "services.bus.mqtt": (*CORE, "services.bus.connection", "services.bus.outbox"),
     "services.bus.memory": (*CORE, "services.bus.outbox"),
     "services.bus.connection": CORE,
     "services.bus.outbox": CORE,
-    "services.ros_master": ("services.errors",),
-    "services.ros_node": ("services.errors", "services.ros_master"),
+    "services.ros": ("services.errors",),
     "services.vision": ("services.errors",),
     "services.storage": ("services.errors", "services.section"),
     "services.document": ("services.errors", "services.whole_file"),
@@ -79,17 +80,17 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.aside": CORE,
     "services.config": (*CORE, *FILES_OF_OURS, "services.registry"),
     "services.runner": (*CORE, "services.aside"),
-    "services.camera": (*SERVICE, "services.vision", "services.http_doors"),
-    "services.bridge": (*SERVICE, *ROS_GRAPH, *THE_FLAT, "services.camera_sections"),
+    "services.camera": (*SERVICE, "services.vision", "services.apartment.zoom_levels", "services.http_doors"),
+    "services.bridge": (*SERVICE, "services.ros", *THE_FLAT, "services.apartment.cameras"),
     "services.persistence": (*SERVICE, "services.storage"),
     "services.history": (*SERVICE, "services.storage", "services.paper"),
     "services.openhab": SERVICE,
     "services.hubs": SERVICE,
     "services.http_doors": (),
     "services.metrics": (*SERVICE, "services.http_doors"),
-    "services.mission": (*SERVICE, "services.floor", "services.robot_places", "services.paper"),
-    "services.dashboard": (*SERVICE, *THE_FLAT, "services.camera_sections"),
-    "services.simulators": (*SERVICE, *ROS_GRAPH, *THE_FLAT),
+    "services.mission": (*SERVICE, "services.apartment.floor", "services.apartment.robot_places", "services.paper"),
+    "services.dashboard": (*SERVICE, *THE_FLAT, "services.apartment.cameras"),
+    "services.simulators": (*SERVICE, "services.ros", *THE_FLAT),
     "services.steering": (*CORE, "services.runner"),
     "services.process": (*CORE, *BUSES, *SHELL, "services.access", "services.steering"),
     "services.doctor": ("services",),
@@ -115,7 +116,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
 
 # One library, one door: where a library may be imported. A name alone is a module, one with a dot at its end all in it.
 EVERYWHERE = ("services", "services.")
-ROS = ("services.ros_node", "services.bridge.", "services.simulators.robot.")
+ROS = ("services.ros.node", "services.bridge.", "services.simulators.robot.")
 DOORS: dict[str, tuple[str, ...]] = {
     "pydantic": EVERYWHERE,
     "pydantic_core": EVERYWHERE,
@@ -135,7 +136,7 @@ DOORS: dict[str, tuple[str, ...]] = {
         "services.vision.",
         "services.camera.video.",
         "services.bridge.images",
-        "services.floor",
+        "services.apartment.floor",
         "services.paper",
         "services.dashboard.thumbnail",
         "services.simulators.camera.",
@@ -144,7 +145,7 @@ DOORS: dict[str, tuple[str, ...]] = {
     "av": ("services.camera.video.rtsp",),
     "gi": ("services.simulators.camera.rtsp.",),
     "pymysql": ("services.storage.mysql",),
-    "sqlite3": ("services.storage.sqlite",),
+    "sqlite3": ("services.storage.sqlite", "services.storage.sqlite_log"),
     "croniter": ("services.persistence.cron",),
     "yaml": ("services.document",),
     "cryptography": ("services.credentials.certificates",),
@@ -193,8 +194,8 @@ OPENHAB_PURE = tuple(
     )
 )  # fmt: skip
 PURE = (
-    "services.errors", "services.section", "services.states", "services.payloads", "services.topics", "services.home",
-    "services.bus", "services.vision.", *(f"services.camera.ptz.{part}" for part in MOVING),
+    "services.errors", "services.section", "services.states", "services.payloads", "services.topics",
+    "services.apartment.home", "services.bus", "services.vision.", *(f"services.camera.ptz.{part}" for part in MOVING),
     "services.camera.scan.search", "services.camera.scan.route", "services.camera.scan.footage",
     "services.camera.scan.source", "services.camera.scan.findings", "services.camera.calibration.zoom",
     "services.camera.video.timing",

@@ -86,7 +86,7 @@ def lens(
 def mount(
     camera: Camera,
     at: Annotated[list[str] | None, typer.Option("--at", help="ID=X,Y,Z of a marker's centre, m; repeat.")] = None,
-    doubt_mm: Annotated[float, typer.Option("--doubt", help="How well that was measured, mm.")] = 10.0,
+    doubt_mm: Annotated[float, typer.Option("--doubt", help="How far from there they mostly are, mm.")] = 10.0,
     keep: Annotated[bool, typer.Option("--keep", help="Leave the configuration file as it is.")] = False,
     yes_move: YesMove = False,
     report: Report = None,

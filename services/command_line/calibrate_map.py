@@ -1,6 +1,6 @@
 """`apartment calibrate map`: where the apartment lies in a robot's map, from points known in both; writes it there.
 
-Not here: the estimate (`vision/calibrate_map.py`), and the file that everybody reads it from (`robot_places.py`).
+Not here: the estimate (`vision/calibrate_map.py`), the file that everybody reads it from (`apartment/robot_places.py`).
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from services.topics import CAMERA_MARKER, CAMERA_SCAN_RESULT, ROBOT_POSE, ROBOT
 from services.whole_file import write_whole
 
 if TYPE_CHECKING:  # numbers, for this command alone: every process of a service loads this module
+    from services.apartment.robot_places import Relation
     from services.mission.both import Both
-    from services.robot_places import Relation
     from services.vision.calibrate_map import MapFit, Pair
 
 TOO_FAR = 5.0  # times what a point was measured to
@@ -187,8 +187,8 @@ def _doubtful(fit: MapFit, doubt_m: float) -> str:
 
 def _write(file: Path, fit: MapFit, *, diff: bool, yes: bool) -> None:
     """Into the robot's file, the old one kept; asks before."""
-    from services import robot_places
-    from services.robot_places import Relation
+    from services.apartment import robot_places
+    from services.apartment.robot_places import Relation
 
     old, old_text = robot_places.places(file).apartment_to_map, file.read_text(encoding="utf-8")
     text = robot_places.with_relation(old_text, Relation(x=fit.x, y=fit.y, yaw_deg=fit.yaw_deg))
@@ -213,7 +213,7 @@ def _may_write(file: Path, old: Relation, fit: MapFit) -> bool:
 
 
 def _replace(file: Path, text: str) -> None:
-    from services import robot_places
+    from services.apartment import robot_places
     from services.camera.calibration import files
 
     backup = files.kept(file, time())

@@ -18,7 +18,7 @@ from services.client import Client
 from services.command_line.options import CONFIG, Config, Json, Marker, out
 from services.config import Apartment, load
 from services.errors import ConfigError
-from services.robot_payloads import MissionOrder, MissionResult, MissionState, Where, WhereReply
+from services.payloads.robot import MissionOrder, MissionResult, MissionState, Where, WhereReply
 from services.topics import MISSION_ORDER, MISSION_RESULT, MISSION_STATE, MISSION_WHERE, MISSION_WHERE_REPLY, read
 
 app = typer.Typer(no_args_is_help=True, help="Send a robot to find a marker, with the house's help.")

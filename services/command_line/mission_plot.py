@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from services import robot_places
+from services.apartment import robot_places
+from services.apartment.floor import XY
 from services.bus import Message
 from services.camera.settings import Config as Camera
 from services.config import Apartment
-from services.floor import XY
 from services.mission import Config, picture
 from services.mission.chart import Chart
 from services.mission.timeline import FILTERS, Timeline

@@ -14,7 +14,7 @@ from services import topics
 from services.bus import Message
 from services.errors import BadMessage
 from services.payloads import CameraStatus, Diagnostic, OrderResult, Position, ScanState, ServiceInfo, stamp
-from services.robot_payloads import MissionResult, MissionState, RobotPose
+from services.payloads.robot import MissionResult, MissionState, RobotPose
 
 HEARD = (
     topics.SERVICE_STATUS, topics.SERVICE_INFO, topics.DIAGNOSTICS, topics.CAMERA_STATUS, topics.CAMERA_POSITION,

@@ -22,7 +22,7 @@ from services.command_line import completion
 from services.command_line.options import CONFIG, Config, Json
 from services.config import Apartment, load
 from services.errors import ConfigError
-from services.history_payloads import HistoryGet
+from services.payloads.history import HistoryGet
 
 if TYPE_CHECKING:  # the databases' libraries, for these commands alone
     from services.persistence import Config as Persistence

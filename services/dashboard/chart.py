@@ -10,7 +10,7 @@ import zlib
 
 import numpy as np
 
-from services.floor import OCCUPIED, Grid
+from services.apartment.floor import OCCUPIED, Grid
 
 GREY = 110
 

@@ -21,8 +21,8 @@ from services.dashboard.sessions import Sessions, Tries
 from services.dashboard.settings import Config
 from services.dashboard.view import sayable
 from services.errors import Unavailable
-from services.history_payloads import HistoryGet, HistoryReply
 from services.payloads import Stream
+from services.payloads.history import HistoryGet, HistoryReply
 from services.runner import Post
 
 Part = TypeVar("Part", str, bytes)

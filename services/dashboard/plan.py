@@ -13,13 +13,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from services import document, robot_places
-from services.camera_sections import Hung
+from services import document
+from services.apartment import robot_places
+from services.apartment.cameras import Hung
+from services.apartment.floor import Grid
+from services.apartment.home import Home
 from services.dashboard import chart
 from services.dashboard.settings import Config
 from services.errors import ConfigError
-from services.floor import Grid
-from services.home import Home
 from services.section import Section
 from services.states import base_type
 from services.vision.lens import Lens

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from services import topics
 from services.bus import LOST_TOPIC, Message
 from services.dashboard.view import RATES_S, Entry, View, heard
-from services.history_payloads import HistoryReply
+from services.payloads.history import HistoryReply
 
 SAY_TOPIC = "/dashboard/say"  # `value`: a Message that a page wants on the bus
 LINK = "/dashboard/broker"  # what pages hear of our own connection: `online`, `offline`

@@ -7,9 +7,9 @@ from typing import Literal
 
 from pydantic import Field, SecretStr, field_validator
 
-from services.camera_sections import CameraSections
+from services.apartment.cameras import CameraSections
+from services.apartment.home import Home
 from services.dashboard import passwords
-from services.home import Home
 from services.section import Section
 
 Role = Literal["viewer", "operator"]

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from services import __version__, topics
-from services.home import Home, Item
+from services.apartment.home import Home, Item
 from services.states import base_type
 
 Fields = dict[str, Any]

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from services import topics
+from services.apartment.home import Home, Item
 from services.bus import Message
 from services.errors import BadMessage
-from services.home import Home, Item
 from services.states import SPECIAL, base_type, plain, quantity
 
 DEVICE = "apartment"

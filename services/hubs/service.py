@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pydantic import Field
 
 from services import topics
+from services.apartment.home import Home
 from services.bus import Message
-from services.home import Home
 from services.hubs import homeassistant, homie
 from services.runner import Post
 from services.section import Section

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from math import dist
 from statistics import median
 
-from services.floor import XY
+from services.apartment.floor import XY
 from services.payloads import ScanResult
-from services.robot_payloads import RobotPose, RobotSeen
+from services.payloads.robot import RobotPose, RobotSeen
 
 STILL_M, STILL_DEG = 0.01, 0.5  # between two poses
 

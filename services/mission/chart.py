@@ -1,7 +1,7 @@
 """From where a robot can follow a lead: poses on its map that face the marker, and its named points.
 
 Without a map it looks from the named points alone. Not here: how good a stand is (`standing.py`), the robot's file
-(`services/robot_places.py`).
+(`services/apartment/robot_places.py`).
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan2, degrees, hypot
 
-from services.floor import Grid
+from services.apartment.floor import Grid
+from services.apartment.robot_places import RobotPlaces
 from services.mission.standing import ANY, Pose, View, body, stands
 from services.mission.state import HERE, ROUND, XYZ, Lead, Stand
-from services.robot_places import RobotPlaces
 
 TURNS_DEG = (0.0, 60.0, 120.0, 180.0, 240.0, 300.0)  # of a look around; a robot's camera sees about 60 degrees
 FLAT = 0.5  # a marker whose normal rises more than this lies rather than hangs

@@ -35,7 +35,7 @@ from services.mission.settings import Config
 from services.mission.standing import Pose
 from services.mission.state import XYZ, Around, Lead, Mission, Stand
 from services.payloads import Diagnostic, OrderResult, stamp
-from services.robot_payloads import GotoResult, MissionOrder, MissionState, RobotPose, RobotSeen
+from services.payloads.robot import GotoResult, MissionOrder, MissionState, RobotPose, RobotSeen
 
 HEALTH_EVERY_S = 1.0
 SILENT_S = 10.0  # a robot that has said nothing for so long is away

@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from services.mission.state import Mission
-from services.robot_payloads import MissionOrder
+from services.payloads.robot import MissionOrder
 from services.whole_file import write_whole
 
 log = logging.getLogger(__name__)

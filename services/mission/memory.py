@@ -8,7 +8,7 @@ from math import sqrt
 from services.errors import BadMessage
 from services.mission.state import XYZ
 from services.payloads import LARGEST, Point, ScanResult, seconds, stamp
-from services.robot_payloads import Whereabouts
+from services.payloads.robot import Whereabouts
 
 MOST = 20_000  # sightings: every marker by two
 

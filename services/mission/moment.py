@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from services.mission.events import Action
 from services.mission.state import NEVER, Around, Mission, Told
-from services.robot_payloads import MissionStep
+from services.payloads.robot import MissionStep
 
 
 @dataclass

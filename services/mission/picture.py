@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
-from services.floor import XY
+from services.apartment.floor import XY
 from services.mission.chart import Chart
 from services.mission.plan_view import PlanView
 from services.mission.timeline import Timeline

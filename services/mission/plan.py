@@ -52,7 +52,7 @@ from services.mission.events import (
 )  # fmt: skip
 from services.mission.moment import Moment
 from services.mission.state import HERE, ROUND, Around, Mission
-from services.robot_payloads import MissionStep
+from services.payloads.robot import MissionStep
 
 Turn = tuple[Mission, list[Action]]
 

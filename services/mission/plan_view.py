@@ -8,7 +8,7 @@ from math import hypot
 
 import numpy as np
 
-from services.floor import FREE, OCCUPIED, UNKNOWN, XY, Grid
+from services.apartment.floor import FREE, OCCUPIED, UNKNOWN, XY, Grid
 from services.mission.chart import Chart
 from services.mission.timeline import Goal, Timeline
 from services.paper import GREY, INK, PALE, WHITE, Colour, Paper

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from services import topics
 from services.bus import Message
 from services.payloads import Order, OrderResult
-from services.robot_payloads import Where
+from services.payloads.robot import Where
 
 FINAL_STATES = ("done", "failed", "refused", "cancelled")
 Asked = tuple[str, Where]  # by way of which robot, and what

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-from services import robot_places, topics
+from services import topics
+from services.apartment import robot_places
 from services.bus import Message
 from services.errors import BadMessage
 from services.mission.chart import Chart
@@ -13,7 +14,7 @@ from services.mission.desk import Desk
 from services.mission.memory import Memory, by_camera
 from services.mission.refresh import Refresh
 from services.mission.settings import Config
-from services.robot_payloads import Where, WhereReply
+from services.payloads.robot import Where, WhereReply
 from services.runner import Post
 
 USABLE = ("online", "degraded")

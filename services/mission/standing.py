@@ -8,7 +8,7 @@ from math import atan2, degrees, hypot, inf, pi, radians, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from services.floor import XY, Grid
+from services.apartment.floor import XY, Grid
 
 RANGE_M = (0.45, 2.3)  # to the marker
 BEST_M, NEAREST_M = 1.2, 0.8  # as a rule; nearer to a print that lies high, and where there is no other place

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from services.robot_payloads import MissionStep
+from services.payloads.robot import MissionStep
 
 XYZ = tuple[float, float, float]
 NEVER = 1e300  # a deadline that JSON can carry

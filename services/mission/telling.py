@@ -10,7 +10,7 @@ from services.mission.events import Action, Go, Halt, Scan
 from services.mission.memory import point
 from services.mission.state import ENDS, Mission, Stand
 from services.payloads import Order, stamp
-from services.robot_payloads import (
+from services.payloads.robot import (
     MissionEvent,
     MissionOrder,
     MissionResult,

@@ -12,7 +12,7 @@ from services import topics
 from services.bus import Message
 from services.errors import BadMessage
 from services.payloads import ScanResult, ScanState
-from services.robot_payloads import GotoResult, MissionResult, MissionState, RobotGoto, RobotPose, RobotSeen
+from services.payloads.robot import GotoResult, MissionResult, MissionState, RobotGoto, RobotPose, RobotSeen
 
 XY = tuple[float, float]
 FILTERS = (

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from services.home import Alexa, Home, Item
+from services.apartment.home import Alexa, Home, Item
 from services.openhab.lines import Metadata, Setting
 from services.openhab.skill import MODES, attributes_of
 from services.states import base_type, plain

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.home import GROUP_ROS
+from services.apartment.home import GROUP_ROS
 from services.openhab.mqtt import SILENT
 from services.openhab.reactions import ChannelTriggered, MemberChanged, Reaction, Started, Trigger, reactions
 from services.openhab.site import Site

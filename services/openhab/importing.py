@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from services.home import GROUP_ROS, NAME, Group, Home, Item
+from services.apartment.home import GROUP_ROS, NAME, Group, Home, Item
 from services.openhab import importing_things, readback, semantics
 from services.openhab.check import read_site
 from services.openhab.check.across import Site as Read

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from services.home import MqttTopics
+from services.apartment.home import MqttTopics
 from services.openhab.lines import ChannelLine, ThingLine, identifier
 
 KINDS = {"zwave": "zwave", "mqtt": "mqtt"}  # others are virtual for us

@@ -8,8 +8,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from services.home import GROUP_ROS, Group, Home, Item
-from services.home import Metadata as Kept
+from services.apartment.home import GROUP_ROS, Group, Home, Item
+from services.apartment.home import Metadata as Kept
 from services.openhab import alexa, semantics
 from services.openhab.lines import ItemLine, Metadata, label
 from services.openhab.mqtt import channel_uid, is_mqtt, link_uids

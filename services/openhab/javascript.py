@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from services.home import GROUP_ROS
+from services.apartment.home import GROUP_ROS
 from services.openhab.mqtt import SILENT
 from services.openhab.reactions import ChannelTriggered, MemberChanged, Reaction, Started, Trigger, reactions
 from services.openhab.site import Site

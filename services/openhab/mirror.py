@@ -15,9 +15,9 @@ from typing import Protocol
 from pydantic import Field, SecretStr, field_validator
 
 from services import topics
+from services.apartment.home import GROUP_ROS, Home
 from services.bus import Message
 from services.errors import BadMessage
-from services.home import GROUP_ROS, Home
 from services.openhab.rest import ANSWER, LOST, STATE, STATES, Answer, Connection, Write
 from services.runner import Post
 from services.section import Section

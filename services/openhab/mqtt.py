@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from services import topics
-from services.home import Home, Item
+from services.apartment.home import Home, Item
 from services.openhab.lines import ChannelLine, Metadata, Setting, ThingLine
 from services.openhab.site import BUS, Site
 from services.openhab.versions import Version

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from services.home import GROUP_ROS
+from services.apartment.home import GROUP_ROS
 from services.openhab.site import Site
 from services.openhab.things import COMMANDS, UPDATES
 

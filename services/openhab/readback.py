@@ -11,8 +11,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from services.home import GROUP_ROS, Alexa, Item, Range
-from services.home import Metadata as Kept
+from services.apartment.home import GROUP_ROS, Alexa, Item, Range
+from services.apartment.home import Metadata as Kept
 from services.openhab.lines import ItemLine, Metadata, Setting
 from services.openhab.semantics import point_tags
 from services.openhab.skill import OLD_TAGS

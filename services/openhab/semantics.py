@@ -5,7 +5,7 @@ Only classes that every release from 3.0 on knows.
 
 from __future__ import annotations
 
-from services.home import Home, Item, Room, Thing
+from services.apartment.home import Home, Item, Room, Thing
 from services.states import base_type
 
 ROOM_WORDS = {

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-from services.home import GROUP_ROS, Home
+from services.apartment.home import GROUP_ROS, Home
 from services.openhab.lines import identifier, unique
 from services.openhab.versions import Version
 from services.openhab.words import THING_WORDS

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from services.home import Item
+from services.apartment.home import Item
 from services.openhab.cameras import parts
 from services.openhab.lines import label, quoted
 from services.openhab.site import Camera, Site

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from services.home import Item, Range
+from services.apartment.home import Item, Range
 from services.openhab.lines import Metadata, Setting
 from services.states import base_type, plain
 

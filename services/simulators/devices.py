@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import tzinfo
 
+from services.apartment.home import Item
 from services.errors import BadMessage
-from services.home import Item
 from services.states import SPECIAL, base_type, color, moment, moment_text, number, parts, percent, plain, quantity
 
 STEP_PERCENT = 10.0  # INCREASE and DECREASE, where the range has no step

@@ -15,9 +15,9 @@ from random import Random
 from pydantic import Field
 
 from services import topics
+from services.apartment.home import Home
 from services.bus import Message
 from services.errors import BadMessage
-from services.home import Home
 from services.runner import Post
 from services.section import Section
 from services.simulators.agenda import Agenda

@@ -12,7 +12,7 @@ from datetime import datetime
 from functools import partial
 from random import Random
 
-from services.home import Home, Item
+from services.apartment.home import Home, Item
 from services.simulators import climate
 from services.simulators.agenda import Agenda
 from services.simulators.devices import convert, unit_of

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from services import history
+from services.apartment.home import Home
 from services.aside import Aside
 from services.bus.mqtt import MqttBus
 from services.client import Client
 from services.config import BusSettings
-from services.home import Home
 from services.peers import Missing, mosquitto, wait_until
 from services.process import address, client_id
 from services.runner import Runner

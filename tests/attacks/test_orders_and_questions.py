@@ -13,10 +13,10 @@ import pytest
 import yaml
 
 from services import topics
+from services.apartment.home import Home
 from services.bus import Message
 from services.errors import BadMessage
 from services.history import Config, start
-from services.home import Home
 from services.storage import Batch, CameraOrder, Diagnostic, Item, Sample, Scan, Sighting, open_storage
 from services.topics import HISTORY_GET, HOME_STATE, TABLE
 from tests.camera.flat import Flat

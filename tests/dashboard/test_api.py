@@ -18,10 +18,10 @@ from services import peers, topics
 from services.config import BusSettings
 from services.dashboard.sessions import FREE_TRIES
 from services.dashboard.settings import Tls
-from services.history_payloads import HistoryReply
 from services.payloads import seconds
+from services.payloads.history import HistoryReply
+from services.payloads.robot import MissionResult
 from services.peers import mosquitto
-from services.robot_payloads import MissionResult
 from tests.bus.test_tls import certificates
 from tests.dashboard.parts import PASSWORD, USERS, Browser, Running, configured, running, service
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from services import dashboard
+from services.apartment.floor import FREE, OCCUPIED, UNKNOWN, Grid
 from services.config import load
 from services.dashboard import chart, plan
 from services.dashboard.settings import Config
 from services.errors import ConfigError
-from services.floor import FREE, OCCUPIED, UNKNOWN, Grid
 from tests.dashboard.parts import configured
 
 

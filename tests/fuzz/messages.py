@@ -6,8 +6,8 @@ import random
 import re
 
 from services import topics
+from services.apartment.home import Home
 from services.bus import Message
-from services.home import Home
 from services.topic import CHOICES, Topic
 from tests.fuzz.payloads import drawn
 

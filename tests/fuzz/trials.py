@@ -22,7 +22,7 @@ from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.client import Client, connected
 from services.peers import wait_until
-from services.topics import CAMERA_STREAM
+from services.topics import CAMERA_ORDER_RESULT, CAMERA_STREAM
 from tests.chaos.trials import call_off, crashes, pids
 from tests.chaos.verdict import seconds_until_green
 from tests.chaos.vitals import Vitals
@@ -34,6 +34,7 @@ REQUESTS = 0.1  # for each message
 GREEN_S = 60.0
 AT_ONCE = 4  # requests
 KEEPS_UP_S = 120.0
+SCAN_S = 300.0
 LISTENING = (
     "simulated-home",
     "persistence",
@@ -79,6 +80,13 @@ def apartment(folder: Path) -> Iterator[Whole]:
     """All of it."""
     with whole(folder) as running:
         yield running
+
+
+def warm(running: Whole) -> None:
+    """A whole scan: what that needs of memory is no growth when rubbish happens to order one late."""
+    with connected(running.bus, [CAMERA_ORDER_RESULT.filter]) as bus:
+        result = bus.order("ip1", "Scan", {"full": True}, SCAN_S)
+    assert result.state == "done", result
 
 
 def fuzz(running: Whole, seed: int, count: int) -> Found:

@@ -10,9 +10,9 @@ import pytest
 from jinja2 import Environment
 
 from services import topics
+from services.apartment.home import Home
 from services.bus import Message
 from services.errors import BadMessage
-from services.home import Home
 from services.hubs.homeassistant import entities
 from services.hubs.service import Config, Hubs
 from services.topics import HOME_STATE, HOMIE_SET

@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from services import floor
-from services.floor import XY, Grid
-from services.robot_payloads import MissionResult
-from services.robot_places import RobotPlaces
+from services.apartment import floor
+from services.apartment.floor import XY, Grid
+from services.apartment.robot_places import RobotPlaces
+from services.payloads.robot import MissionResult
 from services.simulators.camera.view.solids import Box, boxes
 from services.simulators.robot import plan
 from services.simulators.robot.sight import RANGE_M, seen

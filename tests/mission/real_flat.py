@@ -14,8 +14,8 @@ import httpx
 
 from services.client import Client, connected
 from services.config import BusSettings
+from services.payloads.robot import MissionOrder, MissionResult
 from services.peers import free_port, mosquitto, running
-from services.robot_payloads import MissionOrder, MissionResult
 from services.topics import CAMERA_STATUS, MISSION_ORDER, MISSION_RESULT, MISSION_STATE, ROBOT_POSE
 from tests.mission.flats import CONFIG, SMALL, TARGET, Flat, configured
 

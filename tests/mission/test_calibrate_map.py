@@ -14,16 +14,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner, Result
 
-from services import robot_places
+from services.apartment import robot_places
+from services.apartment.robot_places import Relation, with_relation
 from services.client import Client, connected
 from services.command_line import calibrate
 from services.config import BusSettings
 from services.errors import ConfigError
 from services.mission.both import Both
 from services.payloads import Point, ScanResult, stamp
+from services.payloads.robot import RobotPose, RobotSeen, SeenMarker
 from services.peers.mosquitto import Broker
-from services.robot_payloads import RobotPose, RobotSeen, SeenMarker
-from services.robot_places import Relation, with_relation
 from services.topics import CAMERA_MARKER, ROBOT_POSE, ROBOT_SEEN, read
 from services.vision.calibrate_map import Pair, fit
 from tests.trials import virtual_flat

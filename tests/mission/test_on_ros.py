@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from services.robot_payloads import MissionResult
+from services.payloads.robot import MissionResult
 from services.simulators.world import load
 from tests.bridge.conftest import ROOT
 from tests.mission.trials import BEDROOM, LONGEST_S, flat

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services import floor, robot_places
+from services.apartment import floor, robot_places
+from services.apartment.floor import FREE, OCCUPIED, UNKNOWN, Grid
 from services.errors import ConfigError
-from services.floor import FREE, OCCUPIED, UNKNOWN, Grid
 from services.mission.standing import ANY, Pose, View, body, stands
 from services.simulators.robot import plan
 from services.simulators.world import load

@@ -6,7 +6,7 @@ import json
 from contextlib import closing
 from pathlib import Path
 
-from services.robot_payloads import MissionResult
+from services.payloads.robot import MissionResult
 from services.storage import open_storage, reading
 from services.topics import MISSION_RESULT, read
 from tests.trials import virtual_flat

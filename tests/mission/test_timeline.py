@@ -8,13 +8,14 @@ import pytest
 from pydantic import BaseModel
 
 from services import topics
+from services.apartment.robot_places import read
 from services.bus import Message
 from services.mission.chart import Chart
 from services.mission.picture import STEPS, draw
 from services.mission.plan_view import FLOOR
 from services.mission.timeline import Timeline
 from services.payloads import Point, ScanState, stamp
-from services.robot_payloads import (
+from services.payloads.robot import (
     GotoResult,
     MissionResult,
     MissionState,
@@ -24,7 +25,6 @@ from services.robot_payloads import (
     RobotSeen,
     SeenMarker,
 )
-from services.robot_places import read
 from tests.bridge.test_service import CONFIG
 
 BEGAN = 1_000_000.0

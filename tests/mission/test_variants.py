@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from services.mission.service import Missions
-from services.robot_payloads import MissionResult
+from services.payloads.robot import MissionResult
 from services.simulators.robot.service import SimulatedRobot
 from services.topics import MISSION_RESULT, MISSION_STATE, read
 from services.virtual import VirtualApartment

@@ -11,7 +11,7 @@ import pytest
 from services.bus import Message
 from services.mission.refresh import Refresh
 from services.payloads import OrderResult
-from services.robot_payloads import Where, WhereReply
+from services.payloads.robot import Where, WhereReply
 from services.topics import read
 from services.virtual import VirtualApartment
 from tests.trials import virtual_flat

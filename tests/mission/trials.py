@@ -18,8 +18,8 @@ import yaml
 
 from services import topics
 from services.client import Client, connected
+from services.payloads.robot import MissionOrder, MissionResult
 from services.peers import wait_until
-from services.robot_payloads import MissionOrder, MissionResult
 from services.simulated import Simulated, parts_of, services_of, start_mosquitto
 from tests.trials import settled
 

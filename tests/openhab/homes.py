@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 from hypothesis import strategies as st
 
-from services.home import Home
+from services.apartment.home import Home
 from services.openhab.site import Camera
 
 SHIPPED = Path(__file__).parents[2] / "config" / "home.yaml"

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from services.home import Home
+from services.apartment.home import Home
 from services.openhab.check import check
 from services.openhab.generate import MARK, files
 from services.openhab.importing import home_of

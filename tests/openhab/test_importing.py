@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.home import Group
+from services.apartment.home import Group
 from services.openhab.check import check
 from services.openhab.generate import files
 from services.openhab.importing import best_version, home_of

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from services.apartment.home import Item
 from services.errors import BadMessage
-from services.home import Item
 from services.simulators.devices import TRAVEL_S, Shutter, convert, kept
 
 

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 import yaml
 
+from services.apartment.home import Home
 from services.bus import Message
 from services.errors import BadMessage
-from services.home import Home
 from services.simulators.home import Config, SimulatedHome, start
 from services.states import check_state, moment, number
 

@@ -14,7 +14,7 @@ from services.dashboard.house import House
 from services.dashboard.http.endpoint import Asked, Body, Done, Endpoint, one_of
 from services.errors import BadMessage
 from services.payloads import Order, Position, PositionSet
-from services.robot_payloads import MissionOrder, Where
+from services.payloads.robot import MissionOrder, Where
 
 
 class Value(Body):

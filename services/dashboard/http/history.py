@@ -11,9 +11,9 @@ from starlette.responses import Response
 from services.dashboard.house import House
 from services.dashboard.http.endpoint import Asked, Endpoint
 from services.errors import BadMessage
-from services.history_payloads import HistoryReply
 from services.payloads import seconds, stamp
-from services.robot_payloads import MissionResult
+from services.payloads.history import HistoryReply
+from services.payloads.robot import MissionResult
 from services.states import base_type
 
 POINTS = 800  # of a plot, when nobody says how many

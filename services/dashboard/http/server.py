@@ -14,7 +14,7 @@ from services.dashboard.house import House
 from services.dashboard.http.application import application
 from services.dashboard.http.connection import Listening, Visit
 from services.dashboard.view import Entry
-from services.history_payloads import HistoryReply
+from services.payloads.history import HistoryReply
 
 log = logging.getLogger(__name__)
 START_S = 20.0

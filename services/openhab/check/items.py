@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from lark import Token
 
-from services.home import NAME
+from services.apartment.home import NAME
 from services.openhab.check import patterns
 from services.openhab.check.findings import Findings, Place
 from services.openhab.check.items_grammar import FUNCTIONS, NEW_FUNCTIONS, grammar

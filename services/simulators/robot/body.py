@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import atan2, cos, degrees, hypot, radians, sin
 
-from services.floor import XY
+from services.apartment.floor import XY
 
 SPEED = 0.45  # m/s, of a careful robot in a flat
 TURN = 60.0  # degrees per second

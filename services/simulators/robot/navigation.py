@@ -9,7 +9,7 @@ from itertools import pairwise
 from math import dist, hypot
 from random import Random
 
-from services.floor import XY, Grid
+from services.apartment.floor import XY, Grid
 from services.simulators.robot.body import Body
 from services.simulators.robot.route import route
 

@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from services import ros_master, ros_node
 from services.errors import Unavailable
+from services.ros import master as ros_master
+from services.ros import node as ros_node
 from services.simulators.robot import eye
 from services.simulators.robot.eye import Eye
 from services.simulators.robot.navigation import Navigation

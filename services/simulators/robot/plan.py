@@ -11,7 +11,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from services.floor import FREE, OCCUPIED, UNKNOWN, Grid
+from services.apartment.floor import FREE, OCCUPIED, UNKNOWN, Grid
 from services.simulators.camera.view.solids import Box, boxes
 from services.simulators.world import Room, World
 from services.vision.frames import Array

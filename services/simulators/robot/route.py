@@ -8,7 +8,7 @@ from math import hypot
 
 import numpy as np
 
-from services.floor import XY, Grid
+from services.apartment.floor import XY, Grid
 
 STEPS = tuple((row, column) for row, column in product((-1, 0, 1), repeat=2) if (row, column) != (0, 0))
 Cell = tuple[int, int]

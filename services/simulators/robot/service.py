@@ -14,11 +14,12 @@ from random import Random
 import numpy as np
 from pydantic import Field
 
-from services import robot_places, topics
+from services import topics
+from services.apartment import robot_places
 from services.bus import Message
 from services.errors import ConfigError
 from services.payloads import Point, stamp
-from services.robot_payloads import GotoResult, RobotCancel, RobotGoto, RobotPose, RobotSeen, SeenMarker
+from services.payloads.robot import GotoResult, RobotCancel, RobotGoto, RobotPose, RobotSeen, SeenMarker
 from services.runner import Post, Service
 from services.section import Section
 from services.simulators.camera.view.solids import boxes

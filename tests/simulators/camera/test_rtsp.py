@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import socket
+import weakref
 from collections.abc import Iterator
 from contextlib import suppress
 from threading import enumerate as threads
@@ -195,9 +197,13 @@ def test_nothing_is_left_when_the_camera_ends(config: Config) -> None:
     before = {thread.ident for thread in threads()}
     with start(config) as camera, _opened(_url(camera)) as video:
         next(_frames(video))
+        held = weakref.ref(camera.server)
     assert {thread.ident for thread in threads()} <= before
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection(("127.0.0.1", camera.rtsp_port or 0), timeout=1)
+    del camera, video
+    gc.collect()
+    assert held() is None, "GStreamer holds the camera and its pictures"
 
 
 def test_no_port_is_opened_where_none_is_wanted(config: Config) -> None:

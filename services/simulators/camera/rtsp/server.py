@@ -109,7 +109,14 @@ class Server:
         self._thread.join()
         for feed in self._feeds.values():
             feed.close()
+        self._let_go()
+
+    def _let_go(self) -> None:
+        """GStreamer's objects hold what they call; in a circle through C that would never be free, pictures and all."""
         self._sources.clear()
+        self._server.disconnect_by_func(self._connected)
+        self._server.set_auth(None)
+        self._server.get_mount_points().remove_factory(PATH)
 
     def cut(self) -> None:
         """Ends every connection; the encoders end with them."""
@@ -130,7 +137,7 @@ class Server:
             self._soon(client.close)
 
     def _soon(self, act: Callable[[], None]) -> None:
-        """Lets the port's own thread do it, between what it does for its clients."""
+        """Lets the port's own thread do it before it hears its clients again: who is turned away gets no word in."""
 
         def once(_: Any) -> bool:
             act()
@@ -138,6 +145,7 @@ class Server:
 
         source = GLib.idle_source_new()
         source.set_callback(once)
+        source.set_priority(GLib.PRIORITY_HIGH)
         source.attach(self._context)
 
     def _cleaning(self) -> Any:
