@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import Lock
 from typing import Literal
@@ -30,6 +30,7 @@ NOISE_PLAY = 64  # pixels by which the noise pattern is shifted from frame to fr
 QUALITY = 88
 SETTLING_S, DARK = 1.5, 0.25  # a change of mode: how long, and how dark at first; inferred
 AHEAD_M = 3.0  # distance at which the blur of a turn is taken
+SMEAR_PX, COARSEST = 4.0, 4  # what a turn smears is drawn so coarse that it is smeared over this many pixels still
 
 
 @dataclass(frozen=True)
@@ -106,18 +107,24 @@ class Pictures:
         size = self.size(stream)
         if self._tables.covered:
             return np.zeros((size[1], size[0], 3), np.uint8)
-        still = self._still(stream, pose, size)
-        image = blurred(still.image, self._sweep(pose, rates, still.window))
+        view = self._window(pose, size)
+        sweep = self._sweep(pose, rates, view)
+        still = self._still(stream, pose, coarser(view, sweep))
+        image = blurred(still.image, sweep * still.window.scale / view.scale)
+        image = _resized(image, (view.width, view.height))
         image = image if exposure == 1.0 else np.asarray(cv2.convertScaleAbs(image, alpha=exposure), np.uint8)
         image = _resized(self._noisy(image), size)
         return upright(self._toned(image), self._camera, self._tables)
 
-    def _still(self, stream: Stream, pose: Pose, size: tuple[int, int]) -> Still:
-        """Drawn anew only when the camera has moved; never finer than the sensor."""
+    def _window(self, pose: Pose, size: tuple[int, int]) -> Window:
+        """What the picture shows, never finer than the sensor."""
         zoom, lens = magnification(pose.zoom), self._camera.lens
         width, height = min(size[0], round(lens.width / zoom)), min(size[1], round(lens.height / zoom))
-        view, still = window(lens, zoom, width, height), self._stills.get(stream)
-        moved = self._scene.changes
+        return window(lens, zoom, width, height)
+
+    def _still(self, stream: Stream, pose: Pose, view: Window) -> Still:
+        """Drawn anew only when the camera has moved."""
+        moved, still = self._scene.changes, self._stills.get(stream)
         if still is None or (still.pose, still.window, still.boards) != (pose, view, moved):
             still = Still(pose, view, self._scene.draw(self._camera.pose(pose.pan, pose.tilt), view), moved)
             self._stills[stream] = still
@@ -161,6 +168,15 @@ def upright(image: Image, camera: WorldCamera, tables: Tables) -> Image:
     rows = -1 if tables.flag("VideoInOptions[0].Flip") != turned else 1
     columns = -1 if tables.flag("VideoInOptions[0].Mirror") != turned else 1
     return np.ascontiguousarray(image[::rows, ::columns])
+
+
+def coarser(view: Window, sweep: Array) -> Window:
+    """The same with larger pixels where the sweep (pixels) hides what finer ones would show: a machine that has other
+    work keeps the frame rate in a turn."""
+    length, parts = float(np.hypot(*sweep)), 1
+    while parts < COARSEST and length / parts >= 2 * SMEAR_PX:
+        parts *= 2
+    return replace(view, width=view.width // parts, height=view.height // parts)
 
 
 def blurred(image: Image, sweep: Array) -> Image:

@@ -27,7 +27,7 @@ from services.vision.frames import Array, Transform
 
 NEAR_M = 0.05  # nothing nearer to the lens is drawn
 LIT_GREY = 214  # what is seen past everything: daylight
-WINDOWS = 3  # kept ready: main stream, substream, and a zoomed one
+WINDOWS = 7  # kept ready: main stream and substream, each also coarser in a turn, and a zoomed one
 BAND_PX = 96
 FINE = 16  # cv2's polygons in sixteenths of a pixel
 
