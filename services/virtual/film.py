@@ -64,6 +64,10 @@ class Film:
         done, self._done = self._done, []
         return done
 
+    def pending(self, now: float) -> bool:
+        """As in the contract."""
+        return bool(self._done or self.footage.pending(now, self.latency))
+
     def _run(self, now: float) -> None:
         """Everything that has arrived by now."""
         while self._next is not None and self._next + LATENCY_S + self.off_s <= now:

@@ -26,6 +26,7 @@ from services.vision.still import Picture, Still, detect_still
 ANALYSED = "/camera/analysed"
 GATHER_S = 1.0  # after the newest frame of a place: one that was lost must not hold up the others
 DECODERS = 2  # threads of a worker that decode: there are frames for both, and decoding is a third of the work
+BEHIND = 5  # niceness of the workers: what turns the camera and reads its stream comes first on a busy machine
 
 log = logging.getLogger(__name__)
 
@@ -125,7 +126,8 @@ def _drawn(task: Task, found: Sequence[Detection]) -> bytes:
 
 
 def _begin_work() -> None:
-    """In a worker process: one thread of OpenCV, and an end when the service is killed."""
+    """In a worker process: one thread of OpenCV, behind whoever turns the camera; it ends with the service."""
+    os.nice(BEHIND)
     pictures.one_thread()
     threading.Thread(target=_follow_parent, daemon=True).start()
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 
 from services.camera.requests import Away, StreamAddress
@@ -38,7 +38,7 @@ class Live:
         self.unfit = False
         self._newest: Newest | None = None
         self._came: deque[Glimpse] = deque()
-        self._done: deque[tuple[Visit, float, bytes]] = deque()
+        self._developing: deque[tuple[Visit, float, Future[bytes]]] = deque()
         self._before: Thumb | None = None
         self._arrived = 0.0
         self._open = ExitStack()
@@ -60,7 +60,7 @@ class Live:
         """Ends a stream of our own, and forgets what has come."""
         self._open.close()
         self._newest = self._darkroom = None
-        self._came, self._done = deque(), deque()  # the darkroom may still be at one of the old ones
+        self._came, self._developing = deque(), deque()  # the darkroom may still be at one of the old ones
 
     @property
     def latency(self) -> float:
@@ -76,11 +76,20 @@ class Live:
         while self._came:
             for visit, frame in self.footage.take(self._came.popleft()):
                 if self._darkroom is not None:
-                    self._darkroom.submit(_develop, visit, frame, self.footage.at(frame), self._done)
+                    future = self._darkroom.submit(_developed, frame)
+                    self._developing.append((visit, self.footage.at(frame), future))
         done = []
-        while self._done:
-            done.append(self._done.popleft())
+        while self._developing and self._developing[0][2].done():
+            visit, at, future = self._developing.popleft()
+            try:
+                done.append((visit, at, future.result()))
+            except Away:
+                visit.got -= 1
         return done
+
+    def pending(self, now: float) -> bool:
+        """Whether more of them may come, or are in the darkroom."""
+        return bool(self._developing or self.footage.pending(now, self.latency))
 
     @property
     def _latency(self) -> tuple[float, float]:
@@ -122,9 +131,6 @@ class Live:
         return not unfit
 
 
-def _develop(visit: Visit, frame: Frame, at: float, done: deque[tuple[Visit, float, bytes]]) -> None:
+def _developed(frame: Frame) -> bytes:
     """On the darkroom's thread."""
-    try:
-        done.append((visit, at, pictures.encode(frame.develop(), FINE)))
-    except Away:
-        visit.got -= 1
+    return pictures.encode(frame.develop(), FINE)

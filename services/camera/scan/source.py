@@ -75,6 +75,10 @@ class Moving(Protocol):
         """The pictures that are done: whose visit, when exposed, JPEG."""
         ...
 
+    def pending(self, now: float) -> bool:
+        """Whether more of them may come."""
+        ...
+
 
 class Source:
     """The frames of one scan. `stream` None: snapshots only; `settle_s` None: as long as it takes."""
@@ -154,8 +158,7 @@ class Source:
 
     def pending(self, now: float) -> bool:
         """Whether frames may still be on their way."""
-        stream = self.stream
-        return stream is not None and bool(stream.footage.pending(now, stream.latency))
+        return self.stream is not None and self.stream.pending(now)
 
     def close(self) -> None:
         """Ends the stream, if it is ours."""

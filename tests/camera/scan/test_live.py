@@ -99,12 +99,16 @@ def test_a_picture_that_is_developed_late_is_none_of_the_next_scan(monkeypatch: 
 
     monkeypatch.setattr(pictures, "encode", slowly)
     stream.live.begin(None)
-    stream.live.footage.open(Visit(wanted=3, since=stream.now))
+    visit = Visit(wanted=3, since=stream.now)
+    stream.live.footage.open(visit)
     for _ in range(8):
         stream.show(1)
         assert stream.live.collect() == []
     assert begun.wait(10)
+    assert visit.over
+    assert stream.live.pending(stream.now), "what is in the darkroom is waited for"
     stream.live.begin(None)
+    assert not stream.live.pending(stream.now)
     may.set()
     assert made.wait(10)
     wait_until(lambda: not [one for one in threads() if one.name.startswith("scan pictures")], "the darkroom's end", 10)
