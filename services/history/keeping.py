@@ -73,23 +73,35 @@ def pieces(storage: Storage, lines: Mapping[str, Keep], now: float) -> Iterator[
 
 
 def _of_item(storage: Storage, item: Item, line: Keep, now: int) -> Iterator[int]:
-    made = [now]
+    until = now - length_s(line.raw)
     for text, kept in line.means.items():
         width = length_s(text)
-        yield from _make_means(storage, item, width, now)
-        made.append(keeping.ends(storage, item, width) or 0)
-        if kept != "forever":
-            yield keeping.forget(storage, item, width, now - length_s(kept))
-    until = min(now - length_s(line.raw), *made) if line.means else now - length_s(line.raw)
+        oldest = 0 if kept == "forever" else max(now - length_s(kept), 0) // width * width
+        closed = (now - LATE_S) // width * width
+        yield from _make_means(storage, item, width, oldest, closed)
+        made = keeping.made(storage, item, width)
+        until = min(until, made[1] if made else closed)
+        if oldest:
+            yield keeping.forget(storage, item, width, oldest)
     while cleared := keeping.clear(storage, item, until, PIECE):
         yield cleared
 
 
-def _make_means(storage: Storage, item: Item, width: int, now: int) -> Iterator[int]:
-    """From where they end to the last interval that nothing is added to any more; gaps are stepped over."""
-    closed = (now - LATE_S) // width * width
-    at = keeping.ends(storage, item, width) or 0
-    while (first := keeping.next_sample(storage, item, at)) is not None and first < closed:
+def _make_means(storage: Storage, item: Item, width: int, oldest: int, closed: int) -> Iterator[int]:
+    """From the oldest that are wanted to the last interval that nothing is added to any more (`closed`).
+
+    Those before the first one that there is come from samples that were brought along later.
+    """
+    made = keeping.made(storage, item, width)
+    spans = ((oldest, made[0]), (made[1], closed)) if made else ((oldest, closed),)
+    for since, until in spans:
+        yield from _summarised(storage, item, width, since, until)
+
+
+def _summarised(storage: Storage, item: Item, width: int, since: int, until: int) -> Iterator[int]:
+    """Piece by piece; gaps are stepped over."""
+    at = since
+    while (first := keeping.next_sample(storage, item, at)) is not None and first < until:
         begin = max(at, first // width * width)
-        at = min(closed, begin + max(PIECE_S // width, 1) * width)
+        at = min(until, begin + max(PIECE_S // width, 1) * width)
         yield keeping.summarise(storage, item, width, begin, at)

@@ -10,10 +10,11 @@ from services.storage import Item, Storage, reading
 from services.storage.reading import DIALECTS, SECOND
 
 
-def ends(storage: Storage, item: Item, width: int) -> int | None:
-    """Until when (seconds) an item's means of that width are made; None when there are none."""
-    rows = storage.read(f"SELECT MAX(start) FROM summary WHERE item_id={item.item_id} AND width={width}")
-    return None if rows[0][0] is None else int(rows[0][0]) + width
+def made(storage: Storage, item: Item, width: int) -> tuple[int, int] | None:
+    """From and until when (seconds) an item's means of that width are made; None when there are none."""
+    rows = storage.read(f"SELECT MIN(start), MAX(start) FROM summary WHERE item_id={item.item_id} AND width={width}")
+    first, last = rows[0]
+    return None if last is None else (int(first), int(last) + width)
 
 
 def next_sample(storage: Storage, item: Item, since_s: int) -> int | None:

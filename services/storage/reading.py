@@ -157,22 +157,28 @@ def _plain(value: object) -> str:
 def buckets(storage: Storage, item: Item, since: int, until: int, every_s: int) -> list[Bucket]:
     """Count, least, mean and greatest number per bucket of `every_s` seconds, counted from 1970; empty ones left out.
 
-    Means that were kept when the raw rows went (`keeping.py`) are used where they fit, the raw rows after them.
+    Kept means (`keeping.py`) are used where they fit, the raw rows before and after them.
     """
-    width, end = _kept_means(storage, item, every_s)
-    kept_until = min(max(since, end * SECOND), until)
-    found = _from_means(storage, item, since, kept_until, every_s, width) if width else []
-    raw = _from_samples(storage, item, kept_until if width else since, until, every_s)
-    if found and raw and found[-1].start == raw[0].start:
-        found[-1:] = [_merged(found[-1], raw.pop(0))]
-    return found + raw
+    width, begin, end = _kept_means(storage, item, every_s)
+    first, then = (min(max(since, at * SECOND), until) for at in (begin, end))
+    found: list[Bucket] = []
+    for bucket in (
+        *_from_samples(storage, item, since, first, every_s),
+        *_from_means(storage, item, first, then, every_s, width),
+        *_from_samples(storage, item, then, until, every_s),
+    ):
+        same = bool(found) and found[-1].start == bucket.start
+        found[-1 if same else len(found) :] = [_merged(found[-1], bucket) if same else bucket]
+    return found
 
 
-def _kept_means(storage: Storage, item: Item, every_s: int) -> tuple[int, int]:
-    """The widest kept means that buckets of this width can be made of, and where they end, seconds; else 0, 0."""
-    rows = storage.read(f"SELECT width, MAX(start) FROM summary WHERE item_id={item.item_id} GROUP BY width")
-    fitting = [(width, start + width) for width, start in rows if every_s % width == 0]
-    return max(fitting, default=(0, 0))
+def _kept_means(storage: Storage, item: Item, every_s: int) -> tuple[int, int, int]:
+    """The widest kept means that buckets of this width can be made of, where they begin and end, seconds; else 0."""
+    rows = storage.read(
+        f"SELECT width, MIN(start), MAX(start) FROM summary WHERE item_id={item.item_id} GROUP BY width"
+    )
+    fitting = [(width, begin, start + width) for width, begin, start in rows if every_s % width == 0]
+    return max(fitting, default=(0, 0, 0))
 
 
 def _from_means(storage: Storage, item: Item, since: int, until: int, every_s: int, width: int) -> list[Bucket]:

@@ -66,13 +66,34 @@ def test_the_last_of_an_interval_and_a_gap_are_kept(storage: Storage) -> None:
     assert storage.read(f"SELECT last FROM summary WHERE width=3600 AND start={T0}") == [
         (float((T0 + 3540) // 60 % 100),)
     ]
-    assert keeping.ends(storage, temp, 3600) == T0 + 40 * DAY + 3600
+    assert keeping.made(storage, temp, 3600) == (T0, T0 + 40 * DAY + 3600)
     assert [one.num for one in storage.samples("Temp")] == [7.0]  # older than all, and yet the newest
 
 
 def test_what_may_still_come_late_is_not_closed(storage: Storage) -> None:
     list(pieces(storage, LINES, T0 + 10 * DAY))
-    assert keeping.ends(storage, storage.items["Temp"], 300) == T0 + 10 * DAY - 300
+    assert keeping.made(storage, storage.items["Temp"], 300) == (T0 + 5 * DAY, T0 + 10 * DAY - 300)
+
+
+def test_samples_brought_along_later_are_seen_and_become_means_before_they_go(storage: Storage) -> None:
+    """As `apartment db import` does with those of another house's years."""
+    temp, now, since = storage.items["Temp"], T0 + 10 * DAY, T0 - 20 * DAY
+
+    def means() -> dict[int, float]:
+        return {
+            one.start // US: round(one.mean, 9) for one in reading.buckets(storage, temp, since * US, now * US, 7200)
+        }
+
+    before = means()
+    list(pieces(storage, LINES, now))
+    brought = range(since, since + DAY, 60)
+    storage.write(Batch([Sample("Temp", t * US, float(t // 3600 % 2), None) for t in brought]))
+    after = {**dict.fromkeys(range(since, since + DAY, 7200), 0.5), **before}
+    assert means() == after
+    list(pieces(storage, LINES, now))
+    assert storage.samples("Temp", until=T0 * US) == []
+    assert means() == after
+    assert list(pieces(storage, LINES, now)) == [0]
 
 
 def test_the_service_keeps_house_in_pieces_between_questions(storage: Storage, database: Database) -> None:
