@@ -147,10 +147,12 @@ def a_tree_is_shown(tree: Tree) -> None:
 def test_the_launch_file_brings_the_tree_of_health_and_a_view_of_plan_picture_and_marker(
     master: ros.Master, mosquitto_broker: mosquitto.Broker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """RViz stays: without a graphics card about one start in 25 on a busy machine ends in Mesa's software renderer
+    (`free(): invalid next size` in swrast_dri.so, below rviz::ImageDisplay::update)."""
     with (
         screen(tmp_path, monkeypatch) as framebuffer,
         patterns.stream(5.0, MAGENTA) as stream,
-        launched(master, tmp_path, mosquitto_broker, "rviz:=true") as log,
+        launched(master, tmp_path, mosquitto_broker, "rviz:=true", "rviz_stays:=true") as log,
         connected(BusSettings(port=mosquitto_broker.port), []) as bus,
         listening(master, AGGREGATED) as ear,
     ):
