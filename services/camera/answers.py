@@ -10,9 +10,7 @@ from uuid import uuid4
 from services import topics
 from services.bus import Message
 from services.camera.orders import Command
-from services.payloads import OrderResult, OrderState, Position, Who
-
-ENDS: tuple[OrderState, ...] = ("done", "failed", "refused", "cancelled")
+from services.payloads import FINAL, OrderResult, OrderState, Position, Who
 
 
 @dataclass(eq=False)
@@ -30,7 +28,7 @@ class Job:
     @property
     def ended(self) -> bool:
         """Whether it has had its last word."""
-        return self.state in ENDS
+        return self.state in FINAL
 
 
 def job(key: str, value: Any, by: Who, order_id: str | None, message: Message) -> Job:
@@ -45,7 +43,7 @@ class Answers:
         self.camera = camera
         self.publish = publish
         self.where = where
-        self.counts = dict.fromkeys(ENDS, 0)
+        self.counts = dict.fromkeys(FINAL, 0)
 
     def tell(self, job: Job, state: OrderState, error: str | None = None, *, clamped: bool = False) -> None:
         """Publishes a step; after the last one nothing more is said about an order."""
