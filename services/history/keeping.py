@@ -79,7 +79,7 @@ def _of_item(storage: Storage, item: Item, line: Keep, now: int) -> Iterator[int
         oldest = 0 if kept == "forever" else max(now - length_s(kept), 0) // width * width
         closed = (now - LATE_S) // width * width
         yield from _make_means(storage, item, width, oldest, closed)
-        made = keeping.made(storage, item, width)
+        made = reading.made(storage, item, width)
         until = min(until, made[1] if made else closed)
         if oldest:
             yield keeping.forget(storage, item, width, oldest)
@@ -92,7 +92,7 @@ def _make_means(storage: Storage, item: Item, width: int, oldest: int, closed: i
 
     Those before the first one that there is come from samples that were brought along later.
     """
-    made = keeping.made(storage, item, width)
+    made = reading.made(storage, item, width)
     spans = ((oldest, made[0]), (made[1], closed)) if made else ((oldest, closed),)
     for since, until in spans:
         yield from _summarised(storage, item, width, since, until)

@@ -10,13 +10,6 @@ from services.storage import Item, Storage, reading
 from services.storage.reading import DIALECTS, SECOND
 
 
-def made(storage: Storage, item: Item, width: int) -> tuple[int, int] | None:
-    """From and until when (seconds) an item's means of that width are made; None when there are none."""
-    rows = storage.read(f"SELECT MIN(start), MAX(start) FROM summary WHERE item_id={item.item_id} AND width={width}")
-    first, last = rows[0]
-    return None if last is None else (int(first), int(last) + width)
-
-
 def next_sample(storage: Storage, item: Item, since_s: int) -> int | None:
     """The time (seconds) of the first sample from then on."""
     found = reading.oldest(storage, item, since_s * SECOND, 1)

@@ -16,6 +16,9 @@ SECOND = 1_000_000
 YEAR_0_TO_1970_S = (
     62_167_219_200  # TO_SECONDS counts whole ones, in UTC as our sessions do; UNIX_TIMESTAMP slow decimals
 )
+AGGREGATES = "COUNT(s.num), MIN(s.num), AVG(s.num), MAX(s.num) FROM sample s"
+PIECE = 50  # buckets asked for at once; SQLite joins no more than 500 questions
+CROWD = 150  # samples in a bucket: from there on a range for each is quicker than groups
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,15 +30,18 @@ class Dialect:
     join: str
     div: str
     greatest_key: str  # the newest key of an item before a bound, as a subquery
+    bucket: str  # the second that the bucket of a sample begins in
 
 
 DIALECTS = {
     "mysql": Dialect(
         moment, MICROSECONDS, "STRAIGHT_JOIN", "DIV",
         "(SELECT x.time FROM sample x WHERE x.item_id=i.item_id AND x.time<{} ORDER BY x.time DESC LIMIT 1)",
+        f"(TO_SECONDS(s.time) - {YEAR_0_TO_1970_S}) DIV {{every_s}} * {{every_s}}",
     ),
     "sqlite": Dialect(
         str, "{}", "CROSS JOIN", "/", "(SELECT MAX(x.time) FROM sample x WHERE x.item_id=i.item_id AND x.time<{})",
+        f"s.time / ({{every_s}} * {SECOND}) * {{every_s}}",
     ),
 }  # fmt: skip
 
@@ -172,16 +178,34 @@ def buckets(storage: Storage, item: Item, since: int, until: int, every_s: int) 
     return found
 
 
+def made(storage: Storage, item: Item, width: int) -> tuple[int, int] | None:
+    """From and until when (seconds) an item's means of that width are made; None when there are none."""
+    rows = storage.read(f"SELECT MIN(start), MAX(start) FROM summary WHERE item_id={item.item_id} AND width={width}")
+    first, last = rows[0]
+    return None if last is None else (int(first), int(last) + width)
+
+
 def _kept_means(storage: Storage, item: Item, every_s: int) -> tuple[int, int, int]:
-    """The widest kept means that buckets of this width can be made of, where they begin and end, seconds; else 0."""
-    rows = storage.read(
-        f"SELECT width, MIN(start), MAX(start) FROM summary WHERE item_id={item.item_id} GROUP BY width"
-    )
-    fitting = [(width, begin, start + width) for width, begin, start in rows if every_s % width == 0]
-    return max(fitting, default=(0, 0, 0))
+    """The widest kept means that buckets of this width can be made of, where they begin and end, seconds; else 0.
+
+    From one width to the next narrower one: each is a look at the key, where a list of widths reads all means.
+    """
+    width = every_s + 1
+    while width := _narrower(storage, item, width):
+        span = made(storage, item, width)
+        if span and every_s % width == 0:
+            return width, *span
+    return 0, 0, 0
+
+
+def _narrower(storage: Storage, item: Item, width: int) -> int:
+    rows = storage.read(f"SELECT MAX(width) FROM summary WHERE item_id={item.item_id} AND width<{width}")
+    return int(rows[0][0] or 0)
 
 
 def _from_means(storage: Storage, item: Item, since: int, until: int, every_s: int, width: int) -> list[Bucket]:
+    if since >= until:
+        return []
     sql = DIALECTS[storage.dialect]
     rows = storage.read(
         f"SELECT start {sql.div} {every_s} * {every_s} b, SUM(n), MIN(lo), SUM(mean*n)/SUM(n), MAX(hi) FROM summary "
@@ -192,24 +216,43 @@ def _from_means(storage: Storage, item: Item, since: int, until: int, every_s: i
 
 
 def _from_samples(storage: Storage, item: Item, since: int, until: int, every_s: int) -> list[Bucket]:
-    sql = DIALECTS[storage.dialect]
-    group = {
-        "mysql": f"(TO_SECONDS(s.time) - {YEAR_0_TO_1970_S}) DIV {every_s} * {every_s}",
-        "sqlite": f"s.time / {every_s * SECOND} * {every_s}",
-    }[storage.dialect]
-    rows = storage.read(
-        f"SELECT {group} b, COUNT(*), MIN(s.num), AVG(s.num), MAX(s.num) FROM sample s "
-        f"WHERE s.item_id={item.item_id} AND s.num IS NOT NULL AND s.time>={sql.at(since)} AND s.time<{sql.at(until)} "
+    """In pieces of so many buckets; how crowded one was tells how the next is best asked for."""
+    step, found, crowded = every_s * SECOND, list[Bucket](), False
+    while since < until:
+        end = min((since // step + PIECE) * step, until)
+        ask = _range_by_range if crowded else _grouped
+        piece = _in_order(storage.read(ask(DIALECTS[storage.dialect], item, since, end, every_s)))
+        crowded = sum(bucket.n for bucket in piece) > PIECE * CROWD
+        found += piece
+        since = end
+    return found
+
+
+def _grouped(sql: Dialect, item: Item, since: int, until: int, every_s: int) -> str:
+    return (
+        f"SELECT {sql.bucket.format(every_s=every_s)} b, {AGGREGATES} WHERE s.item_id={item.item_id} "
+        f"AND s.num IS NOT NULL AND s.time>={sql.at(since)} AND s.time<{sql.at(until)} "
         f"GROUP BY b ORDER BY NULL"  # else MariaDB sorts every sample, not every bucket: twice the time for a year
     )
-    return _in_order(rows)
+
+
+def _range_by_range(sql: Dialect, item: Item, since: int, until: int, every_s: int) -> str:
+    """Each bucket by its own range of the key, without a table of groups: 0.75 of the time on MariaDB, 0.45 on SQLite,
+    where a bucket has 720 samples. An empty one costs 50 us, where it costs nothing in groups."""
+    step = every_s * SECOND
+    return " UNION ALL ".join(
+        f"SELECT {start // SECOND}, {AGGREGATES} WHERE s.item_id={item.item_id} "
+        f"AND s.time>={sql.at(max(start, since))} AND s.time<{sql.at(min(start + step, until))}"
+        for start in range(since // step * step, until, step)
+    )
 
 
 def _in_order(rows: Iterable[tuple[object, ...]]) -> list[Bucket]:
     found = []
     for row in rows:
-        start, n, lo, mean, hi = (float(str(value)) for value in row)
-        found.append(Bucket(int(start) * SECOND, int(n), lo, mean, hi))
+        if row[1]:
+            start, n, lo, mean, hi = (float(str(value)) for value in row)
+            found.append(Bucket(int(start) * SECOND, int(n), lo, mean, hi))
     return sorted(found, key=lambda bucket: bucket.start)
 
 

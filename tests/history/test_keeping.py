@@ -12,7 +12,7 @@ from services.apartment.home import Item as HomeItem
 from services.history import Config
 from services.history.keeping import Keep, by_item, pieces
 from services.history.service import PAUSE_S, ROUND_EVERY_S, SETTLE_S, History
-from services.storage import Batch, Item, Sample, Storage, keeping, open_storage, reading
+from services.storage import Batch, Item, Sample, Storage, open_storage, reading
 from tests.databases import Database
 
 DAY = 86_400
@@ -66,13 +66,13 @@ def test_the_last_of_an_interval_and_a_gap_are_kept(storage: Storage) -> None:
     assert storage.read(f"SELECT last FROM summary WHERE width=3600 AND start={T0}") == [
         (float((T0 + 3540) // 60 % 100),)
     ]
-    assert keeping.made(storage, temp, 3600) == (T0, T0 + 40 * DAY + 3600)
+    assert reading.made(storage, temp, 3600) == (T0, T0 + 40 * DAY + 3600)
     assert [one.num for one in storage.samples("Temp")] == [7.0]  # older than all, and yet the newest
 
 
 def test_what_may_still_come_late_is_not_closed(storage: Storage) -> None:
     list(pieces(storage, LINES, T0 + 10 * DAY))
-    assert keeping.made(storage, storage.items["Temp"], 300) == (T0 + 5 * DAY, T0 + 10 * DAY - 300)
+    assert reading.made(storage, storage.items["Temp"], 300) == (T0 + 5 * DAY, T0 + 10 * DAY - 300)
 
 
 def test_samples_brought_along_later_are_seen_and_become_means_before_they_go(storage: Storage) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import collections
 import itertools
+import random
+import statistics
 from collections.abc import Iterator
 
 import pytest
@@ -162,6 +165,42 @@ def test_kept_means_and_raw_rows_make_one_row_of_buckets(own_storage: Storage) -
     storage.change(f"DELETE FROM sample WHERE item_id={lab.item_id} AND time<{sql.at(us('07:00'))}")
     assert reading.buckets(storage, lab, us("05:00"), us("10:00"), 3600) == whole
     assert reading.buckets(storage, lab, us("05:00"), us("10:00"), 700)[0].start > us("06:30")  # 300 does not divide it
+
+
+def test_crowded_spans_and_empty_ones_are_counted_alike(own_storage: Storage) -> None:
+    """So many in a bucket, and so many buckets, that each is asked for by its own range; then a night without any."""
+    storage, item = own_storage, Item("Crowd", "Number")
+    storage.add_items([item])
+    begin, every, night = us("05:00"), 20 * US, range(130, 390)
+    crowded, wide = reading.CROWD + 50, 5 * reading.PIECE
+    rows = {
+        begin + bucket * every + number * every // crowded: float(random.Random(number + bucket).randrange(-50, 50))
+        for bucket in range(wide)
+        if bucket not in night
+        for number in range(crowded)
+    }
+    storage.write(Batch([Sample("Crowd", at_us, value, None) for at_us, value in rows.items()]))
+    storage.write(Batch([Sample("Crowd", begin + 7, None, "UNDEF")]))
+    since, until = begin + 3 * US, begin + wide * every - 3 * US
+    expected = collections.defaultdict[int, list[float]](list)
+    for at_us, value in rows.items():
+        if since <= at_us < until:
+            expected[at_us // every * every].append(value)
+    found = reading.buckets(storage, storage.items["Crowd"], since, until, every // US)
+    assert [(one.start, one.n, one.lo, one.hi) for one in found] == [
+        (start, len(values), min(values), max(values)) for start, values in sorted(expected.items())
+    ]
+    assert [one.mean for one in found] == pytest.approx([statistics.fmean(expected[one.start]) for one in found])
+
+
+def test_the_widest_of_several_widths_that_fits_is_taken(own_storage: Storage) -> None:
+    """Told from each other by what their means say, which no sample does."""
+    storage, lab = own_storage, own_storage.items["Lab_Temp"]
+    for width in (60, 300, 3600):
+        start = us("06:00") // US
+        storage.change(f"INSERT INTO summary VALUES ({lab.item_id},{width},{start},1,{width},{width},{width},{width})")
+    for every, mean in ((7200, 3600.0), (3600, 3600.0), (600, 300.0), (240, 60.0)):
+        assert [one.mean for one in reading.buckets(storage, lab, us("06:00"), us("06:01"), every)] == [mean]
 
 
 def test_an_item_that_another_process_made_is_found(own_storage: Storage, database: Database) -> None:
