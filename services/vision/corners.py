@@ -6,6 +6,8 @@ times closer than `cornerSubPix`, whose window reaches into the cells. Finding t
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -26,17 +28,17 @@ FARTHEST_PX = 4.0  # a corner that walks farther than this from where it was fou
 QUICK = (2, 16, 4)  # rounds, profiles and reweightings where many squares are to be told apart
 
 
-def sample(grey: Picture, x: Array, y: Array) -> Array:
+def sample(grey: Picture, x: NDArray[Any], y: NDArray[Any]) -> Picture:
     """Bilinear grey values of the picture at x, y (n, ...); beyond its edge the edge's value.
 
     OpenCV rounds where they are to a 32nd of a pixel and the values to whole ones: less than the picture's own noise.
     """
     if not x.size:
-        return np.zeros(x.shape)
+        return np.zeros(x.shape, np.uint8)
     each = len(x), -1
-    across, down = x.reshape(each).astype(np.float32), y.reshape(each).astype(np.float32)
+    across, down = x.reshape(each).astype(np.float32, copy=False), y.reshape(each).astype(np.float32, copy=False)
     values = cv2.remap(grey, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return values.reshape(x.shape).astype(float)
+    return np.asarray(values, np.uint8).reshape(x.shape)
 
 
 def refine(grey: Picture, square: Array, modules: int) -> Array | None:
@@ -58,44 +60,56 @@ def refine_many(grey: Picture, squares: Array, modules: int) -> Array:
 def _refined(grey: Picture, squares: Array, modules: int, rounds: int, profiles: int, reweightings: int) -> Array:
     refined = squares
     for _ in range(rounds):
-        points, strength = _edge_points(grey, np.nan_to_num(refined), modules, profiles)
-        crossed = _cross(*_lines(points, strength, reweightings))
-        near = np.abs(crossed - squares).max(axis=(1, 2)) < FARTHEST_PX  # not so for NaN
+        edge = _edge_points(grey, np.nan_to_num(refined), modules, profiles)
+        crossed = _cross(*_lines(*edge, reweightings))
+        near = np.abs(crossed - squares).max(axis=(1, 2), initial=0) < FARTHEST_PX  # not so for NaN
         refined = np.where(near[:, None, None], crossed, np.nan)
     return refined
 
 
-def _edge_points(grey: Picture, squares: Array, modules: int, profiles: int) -> tuple[Array, Array]:
-    """Where profiles across the sides meet the edge: points (n, 4, p, 2) and how strong it is there (n, 4, p)."""
+def _edge_points(grey: Picture, squares: Array, modules: int, profiles: int) -> tuple[Array, Array, Array]:
+    """Where profiles across the sides meet the edge, x and y (n, 4, p), and how strong it is there (n, 4, p)."""
     along = np.roll(squares, -1, axis=1) - squares
     length = np.maximum(np.linalg.norm(along, axis=2), 1e-9)
-    outward = np.stack((along[..., 1], -along[..., 0]), axis=2) / length[..., None]
+    out_x, out_y = along[..., 1] / length, -along[..., 0] / length
     reach = np.clip(REACH_MODULES * length.min(axis=1) / modules, *REACH_PX)
-    share = np.linspace(TRIM, 1 - TRIM, profiles)[:, None]
-    middle = squares[:, :, None] + share * along[:, :, None]
+    share = np.linspace(TRIM, 1 - TRIM, profiles)
+    middle_x, middle_y = (squares[..., axis, None] + share * along[..., axis, None] for axis in (0, 1))
     count = round(float(reach.max(initial=REACH_PX[0])) / STEP_PX)
     steps = reach[:, None] * np.linspace(-1, 1, 2 * count + 1)
-    at = middle[:, :, :, None] + steps[:, None, None, :, None] * outward[:, :, None, None]
-    profile = sample(grey, at[..., 0], at[..., 1])
-    rise = np.clip(profile[..., 2:] - profile[..., :-2], 0, None) ** 2  # dark to light only: cells do the opposite
-    strength = rise.sum(axis=-1)
-    offset = np.einsum("nips,ns->nip", rise, steps[:, 1:-1]) / np.maximum(strength, 1e-9)
-    return middle + offset[..., None] * outward[:, :, None], strength
+    profile = sample(grey, _across(middle_x, out_x, steps), _across(middle_y, out_y, steps))
+    behind, ahead = profile[..., :-2], profile[..., 2:]
+    rise = (np.maximum(ahead, behind) - behind).astype(np.float32)  # dark to light only: cells do the opposite
+    rise *= rise
+    strength = rise.sum(axis=-1, dtype=float)
+    offset = (rise * steps[:, None, None, 1:-1].astype(np.float32)).sum(axis=-1) / np.maximum(strength, 1e-9)
+    return middle_x + offset * out_x[..., None], middle_y + offset * out_y[..., None], strength
 
 
-def _lines(points: Array, strength: Array, reweightings: int) -> tuple[Array, Array]:
-    """A robust line through each row of points: a point on it (n, 4, 2) and its direction (n, 4, 2)."""
-    weights = np.sqrt(strength)
+def _across(middle: Array, outward: Array, steps: Array) -> NDArray[np.float32]:
+    """One coordinate of every step (n, s) of every profile (n, 4, p): (n, 4, p, s)."""
+    reach = (outward[:, :, None] * steps[:, None]).astype(np.float32)
+    return middle.astype(np.float32)[..., None] + reach[:, :, None]
+
+
+def _lines(x: Array, y: Array, strength: Array, reweightings: int) -> tuple[Array, Array]:
+    """A robust line through each row of points (n, 4, p): a point on it (n, 4, 2) and its direction (n, 4, 2)."""
+    trust = np.sqrt(strength)
+    weights = trust
     for _ in range(reweightings):
         total = np.maximum(weights.sum(axis=2), 1e-9)
-        centre = (weights[..., None] * points).sum(axis=2) / total[..., None]
-        x, y = np.moveaxis(points - centre[:, :, None], 3, 0)
-        angle = np.arctan2(2 * (weights * x * y).sum(axis=2), (weights * (x * x - y * y)).sum(axis=2)) / 2
-        direction = np.stack((np.cos(angle), np.sin(angle)), axis=2)
-        off = x * direction[..., None, 1] - y * direction[..., None, 0]
-        sigma = np.maximum(1.4826 * np.median(np.abs(off), axis=2), OFFSET_FLOOR_PX)
-        weights = np.sqrt(strength) * np.clip(1 - (off / (TUKEY * sigma[..., None])) ** 2, 0, None) ** 2
-    return centre, direction
+        middle_x, middle_y = ((weights * at).sum(axis=2) / total for at in (x, y))
+        right, down = x - middle_x[..., None], y - middle_y[..., None]
+        weighted = weights * right
+        across = (weighted * down).sum(axis=2)
+        angle = np.arctan2(2 * across, (weighted * right - weights * down * down).sum(axis=2)) / 2
+        ahead_x, ahead_y = np.cos(angle), np.sin(angle)
+        off = np.abs(right * ahead_y[..., None] - down * ahead_x[..., None])
+        half = off.shape[2] // 2
+        sigma = np.maximum(1.4826 * np.partition(off, half, axis=2)[..., half], OFFSET_FLOOR_PX)
+        off /= TUKEY * sigma[..., None]
+        weights = trust * np.maximum(1 - off * off, 0) ** 2
+    return np.stack((middle_x, middle_y), axis=2), np.stack((ahead_x, ahead_y), axis=2)
 
 
 def _cross(centre: Array, direction: Array) -> Array:

@@ -20,7 +20,7 @@ from services.vision.codes import DICTIONARIES, Book
 from services.vision.corners import refine, refine_many
 from services.vision.looks import Look, around, halved, longest, near
 from services.vision.shadow import CHANGE, lit
-from services.vision.squares import squares, squares_at_levels
+from services.vision.squares import WINDOW, darker_by, squares, squares_at_levels
 
 __all__ = ["DICTIONARIES", "Detection", "detect"]
 
@@ -29,7 +29,7 @@ Picture = NDArray[np.uint8]
 
 SMALLEST_PX = 10.0  # side of the squares looked for; below 12 or so nothing can be decoded
 SMALLEST_HALVED_PX = 16.0  # the same in a picture that was shrunk: smaller ones are in the one before
-WIDE_WINDOW = 15  # px, in a picture that was shrunk: the border of a blurred marker, or one amid texture
+HALVED_WINDOWS = (WINDOW, 15)  # px, in a picture that was shrunk: the border of a blurred marker, or one amid texture
 OTHER_WINDOWS = (3, 23)  # px: a shadow's edge needs a narrow one
 PART_WINDOWS = (9, 23)  # px, in an enlarged part
 ENLARGED_PX = 80.0  # a doubtful square's side is enlarged to about this, if it is smaller
@@ -118,24 +118,23 @@ class _Search:
     def first(self) -> Iterator[tuple[Look, Array]]:
         """The picture and smaller ones: each with its rough squares."""
         for look in self.looks:
-            whole = look.scale == 1
-            yield look, squares(look.grey, SMALLEST_PX if whole else SMALLEST_HALVED_PX)
-            if not whole:
-                yield look, squares(look.grey, SMALLEST_HALVED_PX, window=WIDE_WINDOW)
+            step = darker_by(look.noise)
+            if look.scale == 1:
+                yield look, squares(look.grey, SMALLEST_PX, step)
+            else:
+                yield look, squares(look.grey, SMALLEST_HALVED_PX, step, HALVED_WINDOWS)
 
     def closer(self) -> Iterator[tuple[Look, Array]]:
         """Slower looks where something may be: enlarged, with other windows; everywhere if there is nothing at all."""
+        whole = self.looks[0]
         for one in self._doubtful()[:MOST_DOUBTFUL]:
-            part, corner = around(self.looks[0].grey, one.corners)
+            part, corner = around(whole.grey, one.corners)
             larger = float(np.clip(ENLARGED_PX / longest(one.corners), 1.0, 3.0))
             grey = cv2.resize(part, None, fx=larger, fy=larger, interpolation=cv2.INTER_CUBIC)
-            look = Look(np.asarray(grey, np.uint8), larger, self.looks[0].noise)
-            for window in PART_WINDOWS:
-                found = squares(look.grey, larger * SMALLEST_PX, window=window, step=FAINT)
-                yield self.looks[0], look.back(found) + corner
+            look = Look(np.asarray(grey, np.uint8), larger, whole.noise)
+            yield whole, look.back(squares(look.grey, larger * SMALLEST_PX, FAINT, PART_WINDOWS)) + corner
         if self.wanted is None and not self.believed:
-            for window in OTHER_WINDOWS:
-                yield self.looks[0], squares(self.looks[0].grey, SMALLEST_PX, window=window)
+            yield whole, squares(whole.grey, SMALLEST_PX, darker_by(whole.noise), OTHER_WINDOWS)
 
     def levels(self) -> Iterator[tuple[Look, Array]]:
         """The squares that a shadow's edge tears: at levels of grey between the light in the shadow and the dark."""

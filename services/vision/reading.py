@@ -22,7 +22,7 @@ Picture = NDArray[np.uint8]
 SPOTS = SPOT * np.array([-0.5, 0.0, 0.5])  # where a cell is sampled, in cells from its middle
 BESIDE = 0.3  # of a cell: how far outside the square the paper is looked for; some print with hardly a rim
 BESIDE_PX = 1.2  # and at least: there the edge's own blur ends
-AT_ONCE = 400_000  # products: of more, the matrix library makes threads, which wait for one another on a busy machine
+AT_ONCE = 250_000  # products: of more, the matrix library makes threads, which wait for one another on a busy machine
 VEIL = 5.0  # grey levels of stray light in the darkest print
 SMOOTHED = 0.45  # of the noise's variance is left between pixels
 NOISY = 0.8  # of a square's variance at most is believed to be noise
@@ -78,7 +78,8 @@ class Evidence:
 def cells(grey: Picture, squares: Array, modules: int) -> Cells:
     """Looks into squares (n, 4, 2)."""
     x, y = place(squares, *_spots(modules))
-    means = sample(grey, x, y).reshape(len(squares), len(SPOTS) ** 2, modules, modules).mean(axis=1)
+    spots = sample(grey, x, y).reshape(len(squares), len(SPOTS) ** 2, modules, modules)
+    means = spots.sum(axis=1, dtype=np.uint16) / len(SPOTS) ** 2
     return Cells(means, _outside(grey, squares, (np.arange(modules) + 0.5) / modules))
 
 
@@ -97,7 +98,7 @@ def _outside(grey: Picture, squares: Array, share: Array) -> Array:
     across = np.roll(length, 1, axis=1) / len(share) * BESIDE
     start = squares + outward * np.maximum(across, BESIDE_PX)
     at = start[:, :, None] + share[:, None] * along[:, :, None]
-    return sample(grey, at[..., 0], at[..., 1])
+    return sample(grey, at[..., 0], at[..., 1]).astype(float)
 
 
 def likely(inner: Array, size: int, rows: Rows) -> Array:
@@ -111,8 +112,11 @@ def fits(inner: Array, rows: Rows) -> NDArray[np.float32]:
 
 
 def _products(looks: Rows, rows: Rows) -> NDArray[np.float32]:
-    few = max(1, AT_ONCE // max(1, rows.size))
-    return np.concatenate([looks[start : start + few] @ rows.T for start in range(0, max(1, len(looks)), few)])
+    found = np.empty((len(looks), len(rows)), np.float32)
+    few = max(1, AT_ONCE // max(1, looks.size))
+    for start in range(0, len(rows), few):
+        found[:, start : start + few] = looks @ rows[start : start + few].T
+    return found
 
 
 def _unshaded(grey: Array) -> Array:
@@ -178,7 +182,7 @@ def likeness(grey: Picture, square: Array, faces: NDArray[np.float32], noise: fl
     across, down = np.meshgrid(shares, shares)
     x, y = place(square[None], across.ravel(), down.ravel())
     within = slice(GRAIN, -GRAIN)
-    seen = sample(grey, x, y).reshape(size, size)[within, within]
+    seen = sample(grey, x, y).astype(float).reshape(size, size)[within, within]
     wanted = faces[:, within, within]
     return max(_explained(seen, wanted, noise), _explained(_unshaded(seen), wanted[:1], 0.0))
 
@@ -192,8 +196,11 @@ def _explained(seen: Array, faces: NDArray[np.float32], noise: float) -> float:
     return float(np.max(together / np.maximum((wanted**2).sum(axis=(1, 2)), 1e-9)) / total)
 
 
-def place(squares: Array, u: Array, v: Array) -> tuple[Array, Array]:
-    """Points (u, v) of the unit square in each of the squares: x and y, (n, len(u)) (Heckbert 1989, section 2.2.3)."""
+def place(squares: Array, u: Array, v: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Points (u, v) of the unit square in each of the squares: x and y, (n, len(u)) (Heckbert 1989, section 2.2.3).
+
+    In single precision: a ten-thousandth of a pixel in the largest picture.
+    """
     a, b, c, d = np.moveaxis(squares, 1, 0)
     bend, right, low = a - b + c - d, b - c, d - c
     area = right[:, 0] * low[:, 1] - low[:, 0] * right[:, 1]
@@ -201,7 +208,12 @@ def place(squares: Array, u: Array, v: Array) -> tuple[Array, Array]:
     g = (bend[:, 0] * low[:, 1] - low[:, 0] * bend[:, 1]) / area
     h = (right[:, 0] * bend[:, 1] - bend[:, 0] * right[:, 1]) / area
     along, across = b - a + g[:, None] * b, d - a + h[:, None] * d
-    over = 1 + g[:, None] * u + h[:, None] * v
-    x = (along[:, :1] * u + across[:, :1] * v + a[:, :1]) / over
-    y = (along[:, 1:] * u + across[:, 1:] * v + a[:, 1:]) / over
+    u, v = u.astype(np.float32), v.astype(np.float32)
+
+    def mixed(*parts: Array) -> NDArray[np.float32]:
+        there, onward, down = (part.astype(np.float32)[:, None] for part in parts)
+        return np.asarray(there + onward * u + down * v, np.float32)
+
+    over = mixed(np.ones(len(squares)), g, h)
+    x, y = (mixed(a[:, axis], along[:, axis], across[:, axis]) / over for axis in (0, 1))
     return x, y

@@ -80,7 +80,7 @@ def _ring(grey: Picture, square: Array, depth: float, middle: Array, side: float
     along, near = (np.arange(SPOTS) + 0.5) / SPOTS, np.full(SPOTS, depth)
     u, v = np.concatenate((along, 1 - near, along, near)), np.concatenate((near, along, 1 - near, along))
     x, y = place(square[None], u, v)
-    return _Ring((np.stack((x[0], y[0]), axis=1) - middle) / side, sample(grey, x, y)[0])
+    return _Ring((np.stack((x[0], y[0]), axis=1) - middle) / side, sample(grey, x, y)[0].astype(float))
 
 
 def _soft(at: Array) -> Array:

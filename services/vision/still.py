@@ -54,9 +54,8 @@ def alike(frames: Sequence[Picture]) -> list[int]:
     if len(frames) < 2:
         return list(range(len(frames)))
     size = (max(1, frames[0].shape[1] // COARSE), max(1, frames[0].shape[0] // COARSE))
-    coarse = np.array([cv2.resize(frame, size, interpolation=cv2.INTER_AREA) for frame in frames], np.int16)
-    apart = np.array([[(np.abs(one - other) > APART).mean() for other in coarse] for one in coarse])
-    groups = apart <= MOVED
+    coarse = [cv2.resize(frame[::2], size, interpolation=cv2.INTER_AREA) for frame in frames]
+    groups = np.array([[(cv2.absdiff(one, other) > APART).mean() <= MOVED for other in coarse] for one in coarse])
     return [int(number) for number in np.flatnonzero(groups[groups.sum(axis=1).argmax()])]
 
 
