@@ -9,6 +9,7 @@ read once more as if in one light (`shadow`). Who is believed is `belief`'s.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -41,6 +42,7 @@ RIMMED, RIM = 0.85, (3.0, 2.0)  # share of a square's outline with paper beside 
 LIKELY = 0.75  # likeness to a code, in whatever light, of a square that is worth to be seen in one light
 MOST_LIKELY = 5  # of them
 SURE = 30.0  # belief of a marker that needs no other light
+SEARCHERS = 2  # threads: the picture itself has about as many outlines as all smaller ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +92,12 @@ def _grey(image: Picture) -> Picture:
     return np.ascontiguousarray(grey)
 
 
+def _rough(look: Look) -> Array:
+    if look.scale == 1:
+        return squares(look.grey, SMALLEST_PX, darker_by(look.noise))
+    return squares(look.grey, SMALLEST_HALVED_PX, darker_by(look.noise), HALVED_WINDOWS)
+
+
 @dataclass(frozen=True, eq=False)
 class _Candidate:
     """A square with what could be read in it; corners in the given picture's pixels, from the code's top-left."""
@@ -116,13 +124,9 @@ class _Search:
         self.shaded: list[tuple[float, Look, Array]] = []
 
     def first(self) -> Iterator[tuple[Look, Array]]:
-        """The picture and smaller ones: each with its rough squares."""
-        for look in self.looks:
-            step = darker_by(look.noise)
-            if look.scale == 1:
-                yield look, squares(look.grey, SMALLEST_PX, step)
-            else:
-                yield look, squares(look.grey, SMALLEST_HALVED_PX, step, HALVED_WINDOWS)
+        """The picture and smaller ones: each with its rough squares, which are looked for while others are read."""
+        with ThreadPoolExecutor(SEARCHERS) as pool:
+            yield from zip(self.looks, pool.map(_rough, self.looks), strict=True)
 
     def closer(self) -> Iterator[tuple[Look, Array]]:
         """Slower looks where something may be: enlarged, with other windows; everywhere if there is nothing at all."""
