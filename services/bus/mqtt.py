@@ -28,7 +28,7 @@ from services.bus.outbox import Outbox
 
 log = logging.getLogger(__name__)
 
-BUSY = 4  # messages taken at once that tell of a flood; one at a time then costs a change of threads for each
+FLOOD = 4, 4000.0  # messages at once, and a second, from which one at a time costs a change of threads for each
 GATHER_S = 0.002  # in a flood the next ones are left to gather so long
 INBOX = 20_000  # waiting messages, beyond which those of QoS 0 are dropped
 RETRY_S = (0.1, 1.0)  # between attempts to connect: first, longest; a restarted broker is met again within 2 s
@@ -70,6 +70,7 @@ class MqttBus:
         self._told = ""
         self._overrun = 0
         self._busy = False
+        self._taken = time.monotonic()
         self._keeper = threading.Thread(target=self._keep_connected, name="bus", daemon=True)
         self._keeper.start()
 
@@ -122,7 +123,8 @@ class MqttBus:
         except queue.Empty:
             pass
         self._keep_up()
-        self._busy = len(taken) >= BUSY
+        before, self._taken = self._taken, time.monotonic()
+        self._busy = len(taken) >= max(FLOOD[0], FLOOD[1] * (self._taken - before))
         return self._to_handle(taken)
 
     def ack(self, messages: Iterable[Message]) -> None:

@@ -9,6 +9,7 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from types import SimpleNamespace
 
 import pytest
 from paho.mqtt.client import Client as Paho
@@ -16,7 +17,7 @@ from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
-from services.bus import Delivery, Message
+from services.bus import Delivery, Message, mqtt
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.bus.network import Client
@@ -127,3 +128,22 @@ def test_it_works_with_more_files_open_than_select_can_watch(
             assert time.monotonic() < end, "nothing came"
             bus.publish(Message("reply/many", b"1"))
             heard = bool(bus.receive(0.1))
+
+
+@pytest.mark.parametrize(("every_s", "gathers"), [(0.001, False), (0.0001, True)], ids=["1,000/s", "10,000/s"])
+def test_only_a_flood_is_left_to_gather(monkeypatch: pytest.MonkeyPatch, every_s: float, gathers: bool) -> None:
+    """At 1,000 a second a turn of 5 ms takes five at once, and whoever waits for those is not made to wait longer."""
+    now, slept = [0.0], list[float]()
+    monkeypatch.setattr(
+        mqtt, "time", SimpleNamespace(time=time.time, monotonic=lambda: now[0], sleep=slept.append), raising=True
+    )
+    bus = MqttBus(Address("gathering", port=1))
+    try:
+        for _turn in range(10):
+            now[0] += 0.005
+            for _ in range(round(0.005 / every_s)):
+                bus.post(Message("home/Light/state"))
+            assert len(bus.receive()) == round(0.005 / every_s)
+    finally:
+        bus.close()
+    assert slept == ([mqtt.GATHER_S] * 9 if gathers else [])
