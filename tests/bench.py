@@ -281,7 +281,7 @@ def writer_table(name: str, rows: list[writer_figures.Row]) -> Table:
     """Figures of the writer and of the history."""
     table = Table(name, "value", "floor", "ratio", "wanted", "the floor is")
     for row in rows:
-        floor, ratio = (f"{row.floor:,.0f}", f"{row.ratio:.2f}") if row.floor and row.ratio else ("", "")
+        floor, ratio = (f"{row.floor:,.1f}", f"{row.ratio:.2f}") if row.floor and row.ratio else ("", "")
         table.add_row(row.name, f"{row.value:,.1f} {row.unit}", floor, ratio, row.wanted, row.floor_is)
     return table
 

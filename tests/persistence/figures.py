@@ -26,7 +26,7 @@ from services.persistence import Config
 from services.persistence.service import Persistence
 from services.persistence.writers import Writers
 from services.runner import Runner
-from services.storage import Batch, Storage
+from services.storage import Batch, Sample, Storage
 from services.storage import Item as Stored
 
 ITEMS = 1000
@@ -236,6 +236,24 @@ def latency(port: int, storage: Storage, rate: float, seconds: float) -> tuple[f
     with publishing(port, count, rate) as go:
         go()
         writer.run(count)
-    ages = sorted(writer.storage.ages)
     writer.close()
-    return 1000 * statistics.median(ages), 1000 * ages[int(len(ages) * 0.99)]
+    return _middle_and_99(writer.storage.ages)
+
+
+def commits(storage: Storage, rate: float, seconds: float) -> tuple[float, float]:
+    """A floor: one row after the other, each committed, as the database takes them; milliseconds as of `latency`."""
+    storage.add_items([Stored("Floor", "Number")])
+    ages, due = [], time.monotonic()
+    for _ in range(int(rate * seconds)):
+        due += random.expovariate(rate)
+        threading.Event().wait(max(0.0, due - time.monotonic()))
+        began = time.perf_counter()
+        storage.write(Batch([Sample("Floor", time.time_ns() // 1000, 1.0, None)]))
+        ages.append(time.perf_counter() - began)
+    storage.close()
+    return _middle_and_99(ages)
+
+
+def _middle_and_99(seconds: list[float]) -> tuple[float, float]:
+    seconds = sorted(seconds)
+    return 1000 * statistics.median(seconds), 1000 * seconds[int(len(seconds) * 0.99)]
