@@ -30,6 +30,7 @@ MIDST_DEG = 6.0  # what is farther off was out of reach, and not the fault of a 
 SHARP_DEG = 0.05  # what the reckoning leaves open, at least
 TRY_DEG = 12.0  # a first hop, whose scale is a guess
 BULK = 1.5  # answers: a start at full speed that is shorter is not worth it
+LATE_LOOK = 2.0  # answers: a look as late as that does not delay what it is for
 FEW = 4  # commands, for a hop, another from rest, and looks
 
 
@@ -98,7 +99,9 @@ class Hopping:
         pace, level, way = helm.skill.paces[lead], abs(turning[lead]), sign(ways[lead])
         end = helm.course.origin[lead] + way * (held * rates[lead] + pace.change(level) * pace.rate(level) / 2)
         for early in (True, False):  # once soon, as long as the speed is not known, and once before the end
-            look = helm.course.end_for(lead, end, now) - 2 * timing.usual - timing.spread
+            ends = helm.course.end_for(lead, end, now)
+            unsure = helm.course.doubt(lead, ends) / rates[lead]
+            look = ends - 2 * timing.usual - min(timing.tail, LATE_LOOK * timing.usual) - unsure
             if look < now or (early and pace.known(level)):
                 continue
             yield from wait(min(look, now + timing.usual) if early else look)

@@ -48,6 +48,7 @@ class Turning:
         try:
             if unsure:
                 now = yield from self._probe(unsure)
+                axes = [axis for axis in axes if self.helm.skill.senses[axis].sure] or axes
             elif own.pan_only(self.helm.skill) and (zoom or PAN in axes):
                 return (yield from (self.homing.tilt(now) if TILT in axes else self.homing.home(now)))
             return (yield from self._legs(axes, now, zoom=zoom))

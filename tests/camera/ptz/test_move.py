@@ -42,6 +42,19 @@ def test_every_goal_is_reached_whatever_the_speeds_the_delay_and_the_sign(
     assert median(requests) < 20, requests
 
 
+@pytest.mark.parametrize("faster", [0.5, 1.0, 1.8])
+def test_an_axis_is_not_led_to_its_goal_before_it_was_seen_which_way_it_goes(faster: float) -> None:
+    """Without diagonals only one axis shows that at a time; the other would run away from its goal meanwhile."""
+    motors, tilts = Motors(mirror=False, faster=faster, diagonals=False), []
+    run, _ = drive(
+        goto(LIMITS.goal(57.6, -0.6, 0.0), LIMITS, Skill(), 1060.0),
+        motors,
+        seen=lambda reply: tilts.append(motors.pose[1]),
+    )
+    assert run.error is None
+    assert max(tilts) < 20.0 + 15.0
+
+
 def test_a_goal_beyond_the_dead_arc_is_reached_the_long_way_round() -> None:
     motors = Motors(pan=170.0)
     run, _ = drive(goto(LIMITS.goal(190.0, 20.0, 0.0), LIMITS, Skill(), 1060.0), motors)
