@@ -1,12 +1,12 @@
 """Pictures into an encoder: one thread for each stream, at the stream's rate, while somebody watches.
 
 A picture arrives later than it was taken, as from a camera that encodes and buffers; `LATENCY_S` is measured on one.
+Another thread hands on what was drawn: a picture that takes long does not delay the ones before it.
 """
 
 from __future__ import annotations
 
 import time
-from collections import deque
 from dataclasses import dataclass, field
 from queue import SimpleQueue
 from threading import Event, Thread
@@ -71,18 +71,27 @@ class Feed:
 
         The first picture is made even if no picture may go out: whoever asked for the stream waits for it.
         """
-        held: deque[tuple[float, bytes]] = deque()
-        due, held_any = time.monotonic(), False
-        while not watched.over.wait(max(min(due, held[0][0] if held else due) - time.monotonic(), 0.0)):
-            now = time.monotonic()
-            while held and held[0][0] <= now:
-                watched.source.emit("push-buffer", Gst.Buffer.new_wrapped(held.popleft()[1]))
-            if due <= now:
-                if self._camera.shows_pictures or not held_any:
-                    held_any = True
-                    held.append((now + LATENCY_S[self._stream], self._picture()))
-                due = max(due + 1 / self._camera.pictures.fps(self._stream), time.monotonic())
+        drawn: SimpleQueue[tuple[float, bytes] | None] = SimpleQueue()
+        sender = Thread(target=_send, args=(watched, drawn), name=f"RTSP {self._stream} out")
+        sender.start()
+        due, first = time.monotonic(), True
+        while not watched.over.wait(max(due - time.monotonic(), 0.0)):
+            if self._camera.shows_pictures or first:
+                first = False
+                drawn.put((time.monotonic() + LATENCY_S[self._stream], self._picture()))
+            due = max(due + 1 / self._camera.pictures.fps(self._stream), time.monotonic())
+        drawn.put(None)
+        sender.join()
 
     def _picture(self) -> bytes:
         image = self._camera.pictures.frame(self._stream, self._camera.clock())
         return cv2.cvtColor(image, cv2.COLOR_BGR2YUV_I420).tobytes()
+
+
+def _send(watched: Watched, drawn: SimpleQueue[tuple[float, bytes] | None]) -> None:
+    """Each picture when it is due, until there are no more or nobody watches."""
+    while (one := drawn.get()) is not None:
+        due, picture = one
+        if watched.over.wait(max(due - time.monotonic(), 0.0)):
+            return
+        watched.source.emit("push-buffer", Gst.Buffer.new_wrapped(picture))

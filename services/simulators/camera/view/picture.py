@@ -30,7 +30,7 @@ NOISE_PLAY = 64  # pixels by which the noise pattern is shifted from frame to fr
 QUALITY = 88
 SETTLING_S, DARK = 1.5, 0.25  # a change of mode: how long, and how dark at first; inferred
 AHEAD_M = 3.0  # distance at which the blur of a turn is taken
-SMEAR_PX, COARSEST = 4.0, 4  # what a turn smears is drawn so coarse that it is smeared over this many pixels still
+SMEAR_PX, COARSEST = 2.0, 4  # what a turn smears is drawn so coarse that it is smeared over this many pixels still
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """The apartment as the lens sees it: floor, ceiling, boxes and printed markers, without noise.
 
-Boxes are drawn from back to front into a pinhole picture, which is then bent as the lens bends it; the markers are
-drawn into the bent picture, exactly (`prints`). What the camera makes of it (noise, colour, JPEG) is in `picture`.
+Boxes are drawn from front to back, each where nothing stands before it, into a pinhole picture, which is then bent as
+the lens bends it; the markers are drawn into the bent picture, exactly (`prints`). What the camera makes of it (noise,
+colour, JPEG) is in `picture`.
 """
 
 from __future__ import annotations
@@ -44,10 +45,11 @@ class Surface:
 
 @dataclass(frozen=True)
 class Pinhole:
-    """The undistorted picture that surfaces are drawn into: focal length and middle in pixels."""
+    """The undistorted picture that surfaces are drawn into: focal length, middle; `free`: where nothing is yet."""
 
     image: Image
     matrix: Array
+    free: Image
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ class Scene:
             self._bends = {window: bend(self.lens, window), **dict(list(self._bends.items())[: WINDOWS - 1])}
         how = self._bends[window]
         flat = np.full((*how.size, 3), LIT_GREY, np.uint8)
-        self._draw_all(Pinhole(flat, how.matrix), pose)
+        self._draw_all(Pinhole(flat, how.matrix, np.full(how.size, 255, np.uint8)), pose)
         image = np.asarray(cv2.remap(flat, *how.where, cv2.INTER_LINEAR), np.uint8)
         view = View(pose, self.lens, window, how.rays)
         for marker in self.world.markers:
@@ -116,12 +118,12 @@ class Scene:
 
     def _draw_all(self, flat: Pinhole, pose: Transform) -> None:
         to_camera = pose.inverse()
-        for surface in self._floor_and_ceiling:
-            draw_surface(flat, surface, to_camera)
         chosen, faces = self._in_view(flat, to_camera), self.order.facing(pose.translation)
-        for index in self.order.back_to_front(chosen, pose.translation):
-            for side in np.flatnonzero(faces[index]):
+        for index in reversed(self.order.back_to_front(chosen, pose.translation)):
+            for side in np.flatnonzero(faces[index])[::-1]:
                 draw_surface(flat, self._surface(index, int(side)), to_camera)
+        for surface in reversed(self._floor_and_ceiling):
+            draw_surface(flat, surface, to_camera)
 
     def _in_view(self, flat: Pinhole, to_camera: Transform) -> Indexes:
         """The boxes that are not wholly behind or beside the picture."""
@@ -161,7 +163,7 @@ def halving(image: Image) -> tuple[Image, ...]:
 
 
 def draw_surface(flat: Pinhole, surface: Surface, to_camera: Transform) -> None:
-    """Draws a surface over what the pinhole picture holds."""
+    """Draws a surface where the pinhole picture is free; there it is free no more."""
     corner = to_camera.apply(surface.corner)
     right, down = to_camera.rotation @ surface.right, to_camera.rotation @ surface.down
     outline = before_camera(np.array([corner, corner + right, corner + right + down, corner + down]))
@@ -176,6 +178,9 @@ def draw_surface(flat: Pinhole, surface: Surface, to_camera: Transform) -> None:
         return
     mask = np.zeros((y1 - y0, x1 - x0), np.uint8)
     cv2.fillConvexPoly(mask, np.round((pixels - (x0, y0)) * FINE).astype(np.int32), 255, cv2.LINE_8, 4)
+    free = flat.free[y0:y1, x0:x1]
+    cv2.bitwise_and(mask, free, mask)
+    cv2.subtract(free, mask, free)
     image = _fitting(surface, outline, flat.matrix[0, 0])
     to_pixels = flat.matrix @ np.column_stack([right, down, corner]) @ _from_texture(image)
     for row in range(0, y1 - y0, BAND_PX):  # in bands, because a slanting surface fills little of its frame
