@@ -26,7 +26,7 @@ from services.vision.still import Picture, Still, detect_still
 ANALYSED = "/camera/analysed"
 GATHER_S = 1.0  # after the newest frame of a place: one that was lost must not hold up the others
 DECODERS = 2  # threads of a worker that decode: there are frames for both, and decoding is a third of the work
-BEHIND = 5  # niceness of the workers: what turns the camera and reads its stream comes first on a busy machine
+BEHIND = 19  # niceness of the workers: what turns the camera and reads its stream comes first on a busy machine
 
 log = logging.getLogger(__name__)
 

@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 from itertools import pairwise
-from statistics import median
+from statistics import fmean, median, pstdev
 
 from services.camera.video.likeness import Likeness
 from services.camera.video.newest import Frame
 
-FIRST_SPARE_S, MOST_SPARE_S = 0.15, 0.6  # how much longer than its pictures need a visit has to last, until it is known
-SPARES = 6  # visits that teach it; the worst of them was an accident
+FIRST_SPARES_S, MOST_SPARE_S = (0.05, 0.25), 0.6  # how much longer than its pictures need visits last; taken as known
+FEW, SPARES = 4, 18  # visits that teach it: with fewer the first ones count too, more are forgotten
+SPREADS = 1.5  # so many standard deviations above their mean: a picture too few costs another visit, many times a spare
 TAUGHT = 8  # departures that teach how late the picture is
 NEAR_S = 0.8  # a picture that begins to move so near to a command does so because of it
 LEAST_UNSURE_S = 0.05
@@ -32,7 +33,7 @@ LATE_S = 1.5  # a picture that is so much later than usual is lost
 class Visit:
     """The camera at rest somewhere: from `since`, until it may have moved on. `wanted` pictures of it; `got` so many.
 
-    `steady`: the picture's light has to have settled too (its mode was changed).
+    `steady`: the picture's light has to have settled too (its mode was changed). `teaches`: how long visits have to be.
     """
 
     wanted: int
@@ -43,6 +44,7 @@ class Visit:
     got: int = 0
     seen: int = 0  # pictures that show it, those included that were not wanted any more
     given_up: bool = False
+    teaches: bool = True
 
     @property
     def over(self) -> bool:
@@ -100,9 +102,10 @@ class Footage:
 
     def long_enough(self, visit: Visit) -> float:
         """From when on the camera may turn again: enough pictures were exposed, as far as one can tell."""
-        few = [FIRST_SPARE_S] * (2 - len(self._spares))
-        spare = sorted([*few, *self._spares])[-2] + (STEADY_FRAMES * self.period if visit.steady else 0.0)
-        return visit.since + visit.wanted * self.period + spare
+        spares = self._spares if len(self._spares) >= FEW else (*FIRST_SPARES_S, *self._spares)
+        spare = fmean(spares) + SPREADS * pstdev(spares)
+        frames = visit.wanted + (STEADY_FRAMES if visit.steady else 0.0)
+        return visit.since + frames * self.period + spare
 
     def take(self, glimpse: Glimpse) -> list[tuple[Visit, Frame]]:
         """One more picture, in the order of their coming; what is now known to be of a visit that wants it."""
@@ -211,6 +214,7 @@ class Footage:
 
     def _learn_spare(self, visit: Visit) -> None:
         """How much longer a visit lasted than its pictures needed: the first one came late, or some were lost."""
-        if visit.departed is not None and visit.seen and not visit.steady:
+        if visit.departed is not None and visit.seen and not visit.steady and visit.teaches:
+            visit.teaches = False
             spare = visit.departed - visit.since - visit.seen * self.period
             self._spares.append(min(MOST_SPARE_S, max(-MOST_SPARE_S, spare)))

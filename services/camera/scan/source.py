@@ -131,7 +131,7 @@ class Source:
         while self.stream is not None and not self.stream.flows(now) and now < self._hopes_until:
             now = yield from wait(now + LOOK_S)
             spot.since = max(spot.since, now - self.stream.latency)
-        self._hopes_until = 0.0
+        spot.teaches, self._hopes_until = not self._hopes_until, 0.0  # the first one waits for more than its pictures
         if self.stream is None or not self.stream.flows(now):
             return (yield from self._snapshots(spot, now))
         spot.since += self.settle_s or 0.0

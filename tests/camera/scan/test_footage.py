@@ -111,6 +111,39 @@ def test_a_visit_lasts_as_long_as_its_pictures_need_and_longer_where_some_were_l
     assert camera.footage.long_enough(visit) - visit.since > 0.95
 
 
+def test_visits_last_the_longer_the_more_they_differ() -> None:
+    lasts = []
+    for differ in (0.0, 0.15):
+        camera = Camera(Footage())
+        camera.live(1.0)
+        for number in range(1, 10):
+            camera.hop(float(number), 1.0, 8, 1.3).since += differ * (-1) ** number
+        camera.live(1.5)
+        visit = Visit(8, camera.now)
+        lasts.append(camera.footage.long_enough(visit) - visit.since)
+    assert lasts[0] + 0.15 < lasts[1] < lasts[0] + 0.35
+
+
+def test_a_visit_teaches_once_how_long_they_last_and_one_that_waited_for_the_stream_does_not() -> None:
+    def lasts(*, teaches: bool, flashes: bool) -> float:
+        footage = Footage()
+        for number in range(1, 8):
+            visit = Visit(8, START + number * 10, teaches=teaches or number > 1)
+            footage.open(visit)
+            footage.leave(visit.since + 1.2, visit.since + 1.2)
+            pictures = [*[0.0] * (12 if number > 1 else 3), *([9.0, 0.0, 0.0, 0.0, 0.0] if flashes else [])]
+            for step, lighter in enumerate(pictures):
+                picture = frame(number * 100 + step, visit.since + 0.05 + step / 10, 0.01)
+                footage.take(Glimpse(picture, "same" if step else "moved", lighter))
+            footage.take(Glimpse(frame(number * 100 + 50, visit.since + 2.0, 0.01), "moved", 0.0))
+        ends = Visit(8, START + 100.0)
+        return footage.long_enough(ends) - ends.since
+
+    usual = lasts(teaches=False, flashes=False)
+    assert usual == pytest.approx(lasts(teaches=False, flashes=True), abs=0.06)
+    assert usual + 0.2 < lasts(teaches=True, flashes=False)
+
+
 def test_pictures_of_a_light_that_has_not_settled_are_not_taken_after_a_change_of_the_mode() -> None:
     footage = Footage()
     visit = Visit(3, START, steady=True)
