@@ -79,6 +79,7 @@ class Scan:
             backwards = dict(reversed([(spot.place, self.routine[spot.place]) for spot in self.spots]))
             if (now := (yield from self._switch(now))) and self.turn == 2:
                 now = yield from self._tour(backwards, now)
+                now = yield from self._mended(now)  # while the mode is on
                 now = yield from self._first_mode(now)  # while the last frames are on their way
         now = yield from self._all_there(now)
         now = yield from self._again(now)
@@ -231,17 +232,31 @@ class Scan:
 
     def _again(self, now: float) -> Plan[float]:
         """Visits once more the places of which frames are missing: the stream stood still, or some were broken."""
-        short = [spot for spot in self.spots if spot.got < spot.wanted and self._needed(spot)]
-        for spot in sorted(short, key=lambda spot: spot.mode != self.mode):
+        short = self._short(now)
+        now = yield from self._mended(now)
+        for spot in short:
             if spot.mode != self.mode:
                 now = yield from self._switch(now)
-            missing, spot.wanted = spot.wanted - spot.got, spot.got
-            now = yield from self._visit(spot.place, self.routine[spot.place], now, missing)
+                now = yield from self._mended(now)
         if not short:
             return now
         if self.modes.changed:
             now = yield from self._first_mode(now)
         return (yield from self._all_there(now))
+
+    def _mended(self, now: float) -> Plan[float]:
+        """Those whose frames are missing in this mode of the picture."""
+        for spot in self._short(now):
+            if spot.mode == self.mode:
+                missing, spot.wanted = spot.wanted - spot.got, spot.got
+                now = yield from self._visit(spot.place, self.routine[spot.place], now, missing)
+        return now
+
+    def _short(self, now: float) -> list[Spot]:
+        """The visits of which it is known that frames are missing, and that they are needed."""
+        self.gather()
+        self.source.pending(now)  # gives up what comes no more
+        return [spot for spot in self.spots if spot.over and spot.got < spot.wanted and self._needed(spot)]
 
     def _needed(self, spot: Spot) -> bool:
         whole = self.second == "always" or not self.stop_early

@@ -12,7 +12,9 @@ import pytest
 
 from services.camera.scan.analysis import Analysed
 from services.camera.scan.findings import Frame
+from services.camera.scan.footage import Glimpse, Visit
 from services.camera.scan.search import Scan
+from services.camera.video.newest import Frame as VideoFrame
 from services.payloads import FINAL
 from tests.camera.scan.virtual_scan import Seer, VirtualScan, virtual_scan
 
@@ -63,6 +65,27 @@ def test_a_scan_is_cancelled_within_a_second_wherever_it_is(trial: VirtualScan, 
     assert trial.states()[-1].state == "cancelled"
     assert {one["state"] for one in answers(trial)} == {"cancelled", "done"}
     assert trial.inside.device.tables.colour == before
+
+
+def test_frames_that_are_missing_in_the_second_mode_are_fetched_before_it_is_left(trial: VirtualScan) -> None:
+    moving, tables = trial.service.scanner.moving, trial.inside.device.tables
+    assert moving is not None
+    footage, looks = moving.footage, tables.looks
+    whole, arrived = footage.take, []
+
+    def some(glimpse: Glimpse) -> list[tuple[Visit, VideoFrame]]:
+        scan = trial.service.scanner.scan
+        of = [spot for spot in scan.spots if (spot.place, spot.mode) == ("Kitchen", "bw")] if scan is not None else []
+        if of and 0.0 < footage.at(glimpse.frame) - of[0].since < 1.0:
+            arrived.append(glimpse)
+            return whole(glimpse) if len(arrived) <= 2 else []
+        return whole(glimpse)
+
+    footage.take = some  # type: ignore[method-assign]
+    scan, _, last = trial.run(ORDER)
+    assert (last.state, last.frames_analysed) == ("done", WHOLE)
+    assert [(spot.place, spot.mode) for spot in scan.spots][2 * len(PLACES) :] == [("Kitchen", "bw")]
+    assert tables.looks - looks == 4, "mode and contrast, there and back"
 
 
 def test_a_camera_that_restarts_is_awaited_and_the_scan_goes_on(trial: VirtualScan) -> None:
