@@ -40,6 +40,7 @@ FIRST = 601  # id of the first of the markers at random places
 SIZE_M = 0.18
 SEED = 1
 AGAIN = 4  # scans after the cold one; the middle one of all is told too
+SIGHTINGS = 3  # searches for the markers, each from where the report's scan began
 LIMIT_S = 400.0
 OPENING_S = 1.5  # until the stream is there, no frame is drawn
 
@@ -69,7 +70,7 @@ class ScanRow:
 
 @dataclass
 class Sighted:
-    """When each marker was first seen, seconds after the start: ours, and the report's."""
+    """When each marker was first seen, seconds after the start: ours (the mean over searches), and the report's."""
 
     ours: dict[int, float]
     report: dict[int, float]
@@ -96,6 +97,7 @@ def rows(seed: int = SEED) -> Compared:
     """The report's scan, then ours from a cold start and again, then ours until each of many markers was seen."""
     found = Compared()
     with tempfile.TemporaryDirectory() as name, flat_with_markers(Path(name), seed) as flat:
+        begins = flat.doors["ip1"].state()["pose"]
         report = report_scan(flat)
         found.rows.append(ScanRow("the report's", report.seconds, report.frames, None))
         for which in ["ours, cold", *["ours, again"] * AGAIN]:
@@ -104,10 +106,15 @@ def rows(seed: int = SEED) -> Compared:
                 state, seconds = scanned(flat, {"full": True})
             row = ScanRow(which, seconds, state.frames_analysed, share[0], least, report.seconds, str(stands))
             found.rows.append(row)
-        with watched(flat) as share:
-            ours = first_sightings(flat)
+        searches, kept = [], []
+        for _ in range(SIGHTINGS):
+            put(flat, begins)
+            with watched(flat) as share:
+                searches.append(first_sightings(flat))
+            kept.append(share[0])
+        ours = {one: mean(seen[one] for seen in searches if one in seen) for one in set().union(*searches)}
         first_turn = {marker: at for marker, at in report.sightings.items() if at < report.seconds / 2}
-        found.sighted = Sighted(ours, first_turn, share[0])
+        found.sighted = Sighted(ours, first_turn, min(kept))
     return found
 
 
@@ -184,8 +191,15 @@ def states(bus: Client) -> list[tuple[float, ScanState]]:
     return [(message.received, read(message, message.received).payload) for message in heard]
 
 
+def put(flat: SmallFlat, pose: dict[str, float]) -> None:
+    """Turns the camera there by hand, and waits until its service has noticed."""
+    flat.doors["ip1"].tell("pose", **pose)
+    with flat.client("camera/ip1/position") as bus:
+        bus.payload("camera/ip1/position", lambda at: abs(at.pan - pose["pan"]) + abs(at.tilt - pose["tilt"]) < 1.0)
+
+
 def _second_turn(message: Message) -> bool:
-    if message.topic != "camera/ip1/scan/state":
+    if message.topic != "camera/ip1/scan/state" or message.retain:
         return False
     state = read(message, message.received).payload
     return FIRST in state.targets and bool(state.turn == 2 or state.state in ("done", "failed"))
@@ -228,7 +242,7 @@ def table(found: Compared) -> Table:
     if counted:
         table.add_row("the middle one", "", "", f"{median(counted):.2f} (<= {bounds.SCAN_OVER_LEAST})", "", "", "")
     if found.sighted is not None:
-        share = f"{found.sighted.share:.0%} of the report's (<= {bounds.SIGHTING_SHARE:.0%})"
+        share = f"{found.sighted.share:.1%} of the report's (<= {bounds.SIGHTING_SHARE:.0%})"
         seen = f"{len(found.sighted.ours)} of 9 seen, the report's {len(found.sighted.report)}"
         late = "" if found.sighted.kept >= ENOUGH else "does not count"
         table.add_row("first sighting, mean", "", seen, share, "", f"{found.sighted.kept:.0%}", late)
