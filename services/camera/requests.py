@@ -164,11 +164,15 @@ class GetPicture:
 
 @dataclass(frozen=True)
 class SetPicture:
-    """Changes how the picture is delivered; None leaves as it is. The answer is the Picture read back."""
+    """Changes how the picture is delivered; None leaves as it is. The answer is the Picture read back.
+
+    `contrast`: that of each profile, 0 to 100, at once with the mode; it is not in the answer.
+    """
 
     flip: bool | None = None
     mirror: bool | None = None
     mode: Mode | None = None
+    contrast: tuple[int, ...] = ()
     rank = Rank.CONFIG
 
 

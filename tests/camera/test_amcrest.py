@@ -196,6 +196,25 @@ def test_the_mode_is_written_where_the_firmware_keeps_it() -> None:
     assert any("VideoInDayNight[0][2].Mode=BlackWhite" in target for target in web.asked)
 
 
+@pytest.mark.parametrize(
+    ("options", "mode"),
+    [("DayNightColor=2", "DayNightColor=2"), ("", "VideoInDayNight[0][2].Mode=BlackWhite")],
+)
+def test_mode_and_contrast_are_written_at_once(options: str, mode: str) -> None:
+    web = Web()
+    bodies = {
+        "name=VideoInOptions": "\r\n".join(
+            f"table.VideoInOptions[0].{one}" for one in ("Flip=true", "Mirror=false", options)
+        ),
+        "name=VideoInDayNight": "table.VideoInDayNight[0][0].Mode=BlackWhite\r\n",
+    }
+    web.answer = lambda target: httpx.Response(200, text=bodies.get(target.split("&")[-1], "OK\r\n"))
+    assert camera(web).send(SetPicture(mode="bw", contrast=(80, 70, 60))) == Picture(True, False, "bw")
+    (written,) = (target for target in web.asked if "setConfig" in target)
+    assert mode in written
+    assert written.endswith("VideoColor[0][0].Contrast=80&VideoColor[0][1].Contrast=70&VideoColor[0][2].Contrast=60")
+
+
 def test_the_digest_is_the_one_computed_by_hand() -> None:
     challenge = Challenge(
         "digest", "Login to AMC0000000000001", "1083253606", "720000000000000000000007a9", "auth", count=1

@@ -171,10 +171,11 @@ class Amcrest:
     def _set_picture(self, request: SetPicture) -> Picture:
         if request.mode is not None and self._in_day_night is None:
             self._picture()
-        if request.flip is not None or request.mirror is not None or not self._in_day_night:
+        elsewhere = request.mode is not None and self._in_day_night
+        if request.flip is not None or request.mirror is not None or not elsewhere:
             self._command(picture.set_picture(request))
-        if request.mode is not None and self._in_day_night:
-            self._command(picture.set_mode(request.mode))
+        if request.mode is not None and elsewhere:
+            self._command(picture.set_mode(request.mode, request.contrast))
         return self._picture()
 
     def _talk(self, dialogue: errands.Dialogue) -> object:

@@ -15,7 +15,7 @@ from typing import cast, get_args
 from services.camera.errands import GetContrast, SetContrast
 from services.camera.looks import SCAN_CONTRAST
 from services.camera.plan import Plan, ask, attempt
-from services.camera.requests import GetPicture, Mode, Picture, Refused, Reply, SetPicture
+from services.camera.requests import Away, GetPicture, Mode, Picture, Refused, Reply, SetPicture
 
 log = logging.getLogger(__name__)
 
@@ -57,16 +57,11 @@ class Modes:
         if self.noted is None:
             yield from self.note()
         assert self.noted is not None
-        high = (SCAN_CONTRAST,) * len(self.noted.contrast)
-        if self.noted.mode == "bw" and self.noted.contrast == high:
+        high = Before("bw", (SCAN_CONTRAST,) * len(self.noted.contrast))
+        if self.noted == high:
             raise Refused("the picture is black and white with high contrast already")
         self._write()
-        reply = yield from ask(SetPicture(mode="bw"))
-        if cast(Picture, reply.result).mode != "bw":
-            raise Refused("the camera said OK, but its video mode has not changed")
-        if high:
-            reply = yield from ask(SetContrast(high))
-        return (reply.sent + reply.received) / 2
+        return (yield from _changed(high))
 
     def leave(self) -> Plan[None]:
         """As it was. DeviceError: it is still to be restored."""
@@ -85,11 +80,7 @@ class Modes:
             self.file.unlink(missing_ok=True)
 
     def _restore(self, before: Before) -> Plan[None]:
-        reply = yield from ask(SetPicture(mode=before.mode))
-        if cast(Picture, reply.result).mode != before.mode:
-            raise Refused("the camera said OK, but its video mode has not changed")
-        if before.contrast:
-            yield from attempt(SetContrast(before.contrast))
+        yield from _changed(before)
         if self.noted is before:
             self.give_over()
 
@@ -113,3 +104,23 @@ class Modes:
             return
         if mode in get_args(Mode):
             self.noted, self.changed = Before(mode, contrast), True
+
+
+def _changed(to: Before) -> Plan[float]:
+    """Changes mode and contrast in one request, after which the camera exposes anew once; returns about when that was.
+
+    Refused where the mode stays as it is; a contrast that does is left.
+    """
+    reply = yield from attempt(SetPicture(mode=to.mode, contrast=to.contrast))
+    if isinstance(reply.error, Refused) and to.contrast:
+        reply = yield from attempt(SetPicture(mode=to.mode))
+    if reply.error is not None:
+        raise reply.error
+    if cast(Picture, reply.result).mode != to.mode:
+        raise Refused("the camera said OK, but its video mode has not changed")
+    if to.contrast and (yield from attempt(GetContrast())).result != to.contrast:
+        again = yield from attempt(SetContrast(to.contrast))
+        if isinstance(again.error, Away):
+            raise again.error
+        reply = again
+    return (reply.sent + reply.received) / 2

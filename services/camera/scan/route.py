@@ -6,6 +6,7 @@ Pan is unwrapped (`ptz/goal.py`), so a way can never lead across the dead arc. N
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -63,6 +64,17 @@ def hop_s(here: Pose, there: Pose, skill: Skill, *, drives: bool) -> float:
         return longest(skill, start, end)
     times = [_alone(pace, abs(b - a)) for pace, a, b in zip(skill.paces[:2], start, end, strict=False)]
     return max(times) if skill.diagonals else sum(times)
+
+
+def detours(stop: Place, way: Sequence[Place], limits: Limits, skill: Skill) -> list[float]:
+    """How many seconds a stop more costs after each of the places of a way, the last one included."""
+    there, poses = _pose(limits, stop), [_pose(limits, place) for place in way]
+
+    def hop(a: Pose, b: Pose, to: Place) -> float:
+        return hop_s(a, b, skill, drives=to.preset is not None)
+
+    onward = [hop(there, b, to) - hop(a, b, to) for (a, b), to in zip(pairwise(poses), way[1:], strict=True)]
+    return [hop(pose, there, stop) + more for pose, more in zip(poses, [*onward, 0.0], strict=True)]
 
 
 def _pose(limits: Limits, place: Place) -> Pose:

@@ -7,8 +7,9 @@ Not here: the order of the places (`route.py`), where frames come from (`source.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Literal, cast
 
 from services.camera.plan import Plan, attempt, wait
@@ -19,6 +20,7 @@ from services.camera.ptz.zooming import widest
 from services.camera.requests import Away, GetPicture, Picture, Reading, Refused, Stop
 from services.camera.scan.findings import Findings, Frame
 from services.camera.scan.modes import Modes
+from services.camera.scan.route import detours
 from services.camera.scan.source import Source, Spot
 from services.errors import DeviceError
 from services.payloads import Place, ScanState
@@ -76,7 +78,8 @@ class Scan:
         now = yield from self.source.begin(now)
         now = yield from self._tour(dict(self.routine), now)
         if self.second == "always" or (self.second == "missed" and (yield from self._missing(now))):
-            backwards = dict(reversed([(spot.place, self.routine[spot.place]) for spot in self.spots]))
+            visited = dict.fromkeys(spot.place for spot in self.spots)
+            backwards = {place: self.routine[place] for place in reversed(visited)}
             if (now := (yield from self._switch(now))) and self.turn == 2:
                 now = yield from self._tour(backwards, now)
                 now = yield from self._mended(now)  # while the mode is on
@@ -125,6 +128,7 @@ class Scan:
                 now = yield from self._all_there(now)  # this place may be all
             if self.stop_early:
                 left = {name: place for name, place in left.items() if self.findings.worth(place)}
+            now = yield from self._mended(now, [self.routine[name], *left.values()])
         return now
 
     def _visit(self, name: str, place: Place, now: float, wanted: int | None = None) -> Plan[float]:
@@ -244,13 +248,21 @@ class Scan:
             now = yield from self._first_mode(now)
         return (yield from self._all_there(now))
 
-    def _mended(self, now: float) -> Plan[float]:
-        """Those whose frames are missing in this mode of the picture."""
+    def _mended(self, now: float, way: Sequence[Place] = ()) -> Plan[float]:
+        """Those whose frames are missing in this mode of the picture, and that are not nearer later on the way."""
         for spot in self._short(now):
-            if spot.mode == self.mode:
+            if spot.mode == self.mode and self._nearest(self.routine[spot.place], way):
                 missing, spot.wanted = spot.wanted - spot.got, spot.got
                 now = yield from self._visit(spot.place, self.routine[spot.place], now, missing)
+                way = [self.routine[spot.place], *way[1:]]
         return now
+
+    def _nearest(self, place: Place, way: Sequence[Place]) -> bool:
+        """Whether a stop there costs least now; `way` begins where the camera is, the second turn where it ends."""
+        if len(way) < 2:
+            return True
+        more = detours(place, way, self.limits, self.skill)
+        return more[0] <= min(*more[1:-1], more[-1] * (2 if self.turn == 1 and self.second == "always" else 1), inf)
 
     def _short(self, now: float) -> list[Spot]:
         """The visits of which it is known that frames are missing, and that they are needed."""

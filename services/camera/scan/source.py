@@ -135,7 +135,7 @@ class Source:
         if self.stream is None or not self.stream.flows(now):
             return (yield from self._snapshots(spot, now))
         spot.since += self.settle_s or 0.0
-        footage, lead = self.stream.footage, self._lead()
+        footage, lead = self.stream.footage, self.skill.timing.usual
         footage.leave(now, now, turns=False)  # a visit of the same pose
         footage.open(spot)
         while now < footage.long_enough(spot) - lead and not spot.over:
@@ -144,6 +144,7 @@ class Source:
             if not self.stream.flows(now):
                 spot.given_up = True
                 return (yield from self._snapshots(spot, now))
+        spot.planned = now + lead
         return now
 
     def leave(self, sent: float) -> None:
@@ -192,7 +193,7 @@ class Source:
         self._stood = reading
 
     def _lead(self) -> float:
-        """So long before the camera may turn, the command for it can be sent."""
+        """So long after it was sent, a command has not turned the camera yet."""
         return SURELY * min(self.skill.timing.took, default=0.0)
 
     def _snapshots(self, spot: Spot, now: float) -> Plan[float]:

@@ -124,6 +124,37 @@ def test_visits_last_the_longer_the_more_they_differ() -> None:
     assert lasts[0] + 0.15 < lasts[1] < lasts[0] + 0.35
 
 
+def test_visits_last_longer_after_ways_whose_end_is_reckoned_too_soon() -> None:
+    camera = Camera(Footage())
+    camera.live(1.0)
+    for number in range(1, 13):
+        way = 0.6 if number % 2 else 2.0
+        camera.footage.leave(camera.now - 0.1, camera.now)
+        camera.live(way, float(number))
+        visit = Visit(8, camera.now - (0.3 if number % 2 else 0.0))
+        camera.footage.open(visit)
+        camera.live(1.3)
+    lasts = []
+    for way in (0.5, 2.0):
+        camera.footage.leave(camera.now, camera.now)
+        camera.footage.open(visit := Visit(8, camera.now + way))
+        lasts.append(camera.footage.long_enough(visit) - visit.since)
+    assert lasts[1] + 0.15 < lasts[0] < lasts[1] + 0.35
+
+
+def test_a_visit_is_over_when_the_motion_that_ended_it_was_seen() -> None:
+    camera = Camera(Footage())
+    camera.live(1.0)
+    camera.hop(1.0, 1.0, 4, 1.0)
+    short = camera.hop(2.0, 1.0, 20, 1.0)
+    camera.footage.leave(camera.now - 0.1, camera.now)
+    camera.live(LATENCY_S - 0.3, 3.0)
+    assert not short.over
+    camera.live(0.6, 3.0)
+    assert short.over
+    assert 9 <= short.got <= 11
+
+
 def test_a_visit_teaches_once_how_long_they_last_and_one_that_waited_for_the_stream_does_not() -> None:
     def lasts(*, teaches: bool, flashes: bool) -> float:
         footage = Footage()

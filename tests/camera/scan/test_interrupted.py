@@ -67,7 +67,8 @@ def test_a_scan_is_cancelled_within_a_second_wherever_it_is(trial: VirtualScan, 
     assert trial.inside.device.tables.colour == before
 
 
-def test_frames_that_are_missing_in_the_second_mode_are_fetched_before_it_is_left(trial: VirtualScan) -> None:
+@pytest.mark.parametrize(("place", "mode"), [("Sofa", "auto"), ("Dining", "bw")])
+def test_missing_frames_are_fetched_on_the_way(trial: VirtualScan, place: str, mode: str) -> None:
     moving, tables = trial.service.scanner.moving, trial.inside.device.tables
     assert moving is not None
     footage, looks = moving.footage, tables.looks
@@ -75,17 +76,20 @@ def test_frames_that_are_missing_in_the_second_mode_are_fetched_before_it_is_lef
 
     def some(glimpse: Glimpse) -> list[tuple[Visit, VideoFrame]]:
         scan = trial.service.scanner.scan
-        of = [spot for spot in scan.spots if (spot.place, spot.mode) == ("Kitchen", "bw")] if scan is not None else []
-        if of and 0.0 < footage.at(glimpse.frame) - of[0].since < 1.0:
+        of = [spot for spot in scan.spots if (spot.place, spot.mode) == (place, mode)] if scan is not None else []
+        if of and glimpse.like == "same" and 0.0 < footage.at(glimpse.frame) - of[0].since < 1.0:
             arrived.append(glimpse)
-            return whole(glimpse) if len(arrived) <= 2 else []
+            return whole(glimpse) if len(arrived) <= 1 else []
         return whole(glimpse)
 
     footage.take = some  # type: ignore[method-assign]
     scan, _, last = trial.run(ORDER)
     assert (last.state, last.frames_analysed) == ("done", WHOLE)
-    assert [(spot.place, spot.mode) for spot in scan.spots][2 * len(PLACES) :] == [("Kitchen", "bw")]
-    assert tables.looks - looks == 4, "mode and contrast, there and back"
+    turns = {one: [spot.place for spot in scan.spots if spot.mode == one] for one in ("auto", "bw")}
+    assert turns[mode].count(place) == 2
+    assert turns[mode][-1] == (PLACES if mode == "auto" else PLACES[::-1])[-1], "not at the very end"
+    assert turns["auto" if mode == "bw" else "bw"] == (PLACES if mode == "bw" else PLACES[::-1])
+    assert tables.looks - looks == 2, "mode and contrast at once, there and back"
 
 
 def test_a_camera_that_restarts_is_awaited_and_the_scan_goes_on(trial: VirtualScan) -> None:

@@ -10,7 +10,7 @@ import pytest
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Reading
-from services.camera.scan.route import hop_s, shortest
+from services.camera.scan.route import detours, hop_s, shortest
 from services.payloads import Place
 
 LIMITS = Limits()
@@ -61,6 +61,22 @@ def test_the_measured_speeds_decide() -> None:
     assert shortest(places, LIMITS, here, slow)[0] == "Far in pan"
     creeping = hop_s((0.0, 0.0, 0.0), (0.0, 40.0, 0.0), slow, drives=False)
     assert creeping > 5 * hop_s((0.0, 0.0, 0.0), (0.0, 40.0, 0.0), quick, drives=False)
+
+
+def test_a_detour_costs_what_the_way_gets_longer() -> None:
+    pans = {"West": 90.0, "Middle": 60.0, "East": 30.0, "Far east": 0.0}
+    places = {name: Place(pan=pan, tilt=20.0, zoom=0.0) for name, pan in pans.items()}
+    way, skill, stop = ["West", "Middle", "East", "Far east"], Skill(), Place(pan=62.0, tilt=20.0, zoom=0.0)
+    more = detours(stop, list(places.values()), LIMITS, skill)
+    with_stop = places | {"Stop": stop}
+
+    def lasts(order: list[str]) -> float:
+        return seconds(order, with_stop, Reading(90.0, 20.0, 0.0), skill)
+
+    assert more == pytest.approx(
+        [lasts([*way[: after + 1], "Stop", *way[after + 1 :]]) - lasts(way) for after in range(len(way))]
+    )
+    assert min(more) == min(more[:2]), "it is on the way there, or just behind"
 
 
 def test_the_last_known_place_of_a_target_comes_first() -> None:

@@ -9,7 +9,7 @@ import re
 from collections.abc import Generator
 from datetime import datetime
 
-from services.camera.brands.dahua import capabilities, events
+from services.camera.brands.dahua import capabilities, events, picture
 from services.camera.brands.dahua.replies import is_ok, read_table
 from services.camera.capabilities import GetCapabilities
 from services.camera.errands import (
@@ -63,7 +63,7 @@ def table(name: str) -> str:
 
 
 def _written(pairs: dict[str, str]) -> Dialogue:
-    body = yield "/cgi-bin/configManager.cgi?action=setConfig&" + "&".join(f"{key}={pairs[key]}" for key in pairs)
+    body = yield picture.written(pairs)
     if not is_ok(body):
         raise Refused(f"expected OK from the camera, got {' '.join(body.split())[:80]!r}")
     return None
@@ -131,7 +131,7 @@ def _contrast() -> Dialogue:
 
 
 def _set_contrast(values: tuple[int, ...]) -> Dialogue:
-    yield from _written({f"VideoColor[0][{profile}].Contrast": str(value) for profile, value in enumerate(values)})
+    yield from _written(picture.contrasts(values))
     return (yield from _contrast())
 
 

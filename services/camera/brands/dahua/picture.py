@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from services.camera.brands.dahua.replies import read_table
 from services.camera.requests import Mode, Picture, Refused, SetPicture
 
@@ -20,14 +22,24 @@ def set_picture(request: SetPicture) -> str:
             wanted += [(f"{profile}{option}", str(flag).lower()) for profile in PROFILES]
     if request.mode is not None:
         wanted += [(f"{profile}DayNightColor", str(MODES[request.mode])) for profile in PROFILES]
-    pairs = "&".join(f"VideoInOptions[0].{key}={value}" for key, value in wanted)
-    return f"/cgi-bin/configManager.cgi?action=setConfig&{pairs}"
+    pairs = {f"VideoInOptions[0].{key}": value for key, value in wanted}
+    return written(pairs | contrasts(request.contrast))
 
 
-def set_mode(mode: Mode) -> str:
+def set_mode(mode: Mode, contrast: tuple[int, ...] = ()) -> str:
     """Writes the mode where newer firmware has it."""
-    pairs = "&".join(f"VideoInDayNight[0][{profile}].Mode={NEW_MODES[mode]}" for profile in range(3))
-    return f"/cgi-bin/configManager.cgi?action=setConfig&{pairs}"
+    modes = {f"VideoInDayNight[0][{profile}].Mode": NEW_MODES[mode] for profile in range(3)}
+    return written(modes | contrasts(contrast))
+
+
+def contrasts(values: tuple[int, ...]) -> dict[str, str]:
+    """The contrast of each profile, as it is written."""
+    return {f"VideoColor[0][{profile}].Contrast": str(value) for profile, value in enumerate(values)}
+
+
+def written(pairs: Mapping[str, str]) -> str:
+    """Writes to tables of the configuration, of any of them at once."""
+    return "/cgi-bin/configManager.cgi?action=setConfig&" + "&".join(f"{key}={pairs[key]}" for key in pairs)
 
 
 def read_picture(options: str, modes: str = "") -> Picture:
