@@ -11,22 +11,21 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 from itertools import pairwise
-from statistics import fmean, median, pstdev, pvariance
+from statistics import fmean, median, pstdev
 
 from services.camera.video.likeness import Likeness
 from services.camera.video.newest import Frame
 
-FIRST_SPARES_S, MOST_SPARE_S = (0.05, 0.25), 0.6  # how much longer than its pictures need visits last; taken as known
-FEW, SPARES = 4, 18  # visits that teach it: with fewer the first ones count too, more are forgotten
-SPREADS = 1.5  # so many standard deviations more than expected: a picture too few costs another visit, many spares
-WAYS_S = 0.3  # as if ways differed by as much more, so that a few visits do not teach what the length of the way does
+FIRST_SPARES_S, MOST_SPARE_S = (-0.05, 0.2), 0.6  # how much longer than its pictures need visits last; taken as known
+SPARES = 18  # visits that teach it; more are forgotten
+SPREADS = 2.5  # so many standard deviations above their mean: a picture too few costs another visit, many spares
 TAUGHT = 8  # departures that teach how late the picture is
 NEAR_S = 0.8  # a picture that begins to move so near to a command does so because of it
 LEAST_UNSURE_S = 0.05
 FIRST_PERIOD_S = 0.1  # between two pictures, before any came
 HELD = 16  # pictures, 5 MB each, of which it is not known yet whose they are
 STEADY, FLASH = 1.2, 4.0  # grey levels from one picture to the next: less, and the light has settled; more is no drift
-STEADY_FRAMES = 1.5  # the first one that is as light as the one before is at least the second
+STEADY_FRAMES = 3.0  # until one is as light as the one before: an encoder spreads a change over a few
 LATE_S = 1.5  # a picture that is so much later than usual is lost
 
 
@@ -35,7 +34,6 @@ class Visit:
     """The camera at rest somewhere: from `since`, until it may have moved on. `wanted` pictures of it; `got` so many.
 
     `steady`: the picture's light has to have settled too (its mode was changed). `teaches`: how long visits have to be.
-    `way`: how long it took to turn there, seconds.
     """
 
     wanted: int
@@ -44,7 +42,6 @@ class Visit:
     until: float | None = None
     planned: float | None = None  # when it was expected to turn, as the command for it was sent
     departed: float | None = None  # by then it surely turned
-    way: float = 0.0
     got: int = 0
     seen: int = 0  # pictures that show it, those included that were not wanted any more
     given_up: bool = False
@@ -81,23 +78,19 @@ class Footage:
     def __init__(self) -> None:
         self.visits: list[Visit] = []
         self.period = FIRST_PERIOD_S
-        self._spares: deque[tuple[float, float]] = deque(
-            maxlen=SPARES
-        )  # how long the way was, and how much it took more
+        self._spares: deque[float] = deque(maxlen=SPARES)
         self._offsets: deque[tuple[float, float]] = deque(maxlen=TAUGHT)  # least and most that exposures are off
         self._departures: list[float] = []
-        self._left: float | None = None
         self._stamps: deque[float] = deque(maxlen=24)
         self._run = _Run()
 
     def begin(self) -> None:
         """A new scan, or a new stream: what was learnt stays."""
-        self.visits, self._departures, self._left, self._run = [], [], None, _Run()
+        self.visits, self._departures, self._run = [], [], _Run()
         self._stamps.clear()
 
     def open(self, visit: Visit) -> None:
         """The camera has come to rest."""
-        visit.way = 0.0 if self._left is None else max(0.0, visit.since - self._left)
         self.visits.append(visit)
 
     def leave(self, earliest: float, latest: float, *, turns: bool = True) -> None:
@@ -105,28 +98,15 @@ class Footage:
         for visit in self.visits:
             if visit.until is None:
                 visit.until, visit.departed = earliest, latest
-        self._left = latest
         if turns:
             self._departures.append(latest)
 
     def long_enough(self, visit: Visit) -> float:
         """From when on the camera may turn again: enough pictures were exposed, as far as one can tell."""
+        spares = (*FIRST_SPARES_S, *self._spares)
+        spare = fmean(spares) + SPREADS * pstdev(spares)
         frames = visit.wanted + (STEADY_FRAMES if visit.steady else 0.0)
-        return visit.since + frames * self.period + self._spare(visit.way)
-
-    def _spare(self, way: float) -> float:
-        """How much longer than its pictures need a visit has to be: when the motors stand is reckoned, and how well
-        that is done depends on the way: a line through what was taught, and what that leaves open.
-        """
-        spares = [spare for _, spare in self._spares]
-        if len(spares) < FEW:
-            spares += FIRST_SPARES_S
-            return fmean(spares) + SPREADS * pstdev(spares)
-        ways, mean = [one for one, _ in self._spares], fmean(spares)
-        middle = fmean(ways)
-        slope = sum((one - middle) * spare for one, spare in self._spares) / len(ways) / (pvariance(ways) + WAYS_S**2)
-        left = pstdev([spare - slope * one for one, spare in self._spares])
-        return mean + slope * (min(max(ways), max(min(ways), way)) - middle) + SPREADS * left
+        return visit.since + frames * self.period + spare
 
     def take(self, glimpse: Glimpse) -> list[tuple[Visit, Frame]]:
         """One more picture, in the order of their coming; what is now known to be of a visit that wants it."""
@@ -241,4 +221,4 @@ class Footage:
         if ended is not None and visit.seen and not visit.steady and visit.teaches:
             visit.teaches = False
             spare = ended - visit.since - visit.seen * self.period
-            self._spares.append((visit.way, min(MOST_SPARE_S, max(-MOST_SPARE_S, spare))))
+            self._spares.append(min(MOST_SPARE_S, max(-MOST_SPARE_S, spare)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 from random import Random
 from threading import RLock
 from typing import Literal
@@ -66,6 +67,12 @@ class Device:
         with self._lock:
             self.ptz.rounds.advance(now)
             return self.ptz.motors.pose(now), self.ptz.motors.rates(now)
+
+    def rest(self) -> Pose | None:
+        """Where the last motion ends, or has ended; None: when somebody stops it."""
+        with self._lock:
+            ends = self.ptz.motors.rests_at
+            return self.ptz.motors.pose(ends + 1.0) if isfinite(ends) else None
 
     def place(self, pose: Pose, now: float) -> None:
         """Puts the motors there at once (the side door)."""

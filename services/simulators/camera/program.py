@@ -88,7 +88,8 @@ def inside(config: Config, now: float) -> Inside:
     device = Device(camera, profile, now, Latency(profile, config.latency_s, Random(config.seed)))
     password = config.password.get_secret_value()
     door = Door(realm(profile, camera.serial), config.user, password, profile, Random(config.seed))
-    pictures = Pictures(Scene(world, camera.lens, config.seed), camera, device.tables, device.motion, config.seed)
+    scene = Scene(world, camera.lens, config.seed)
+    pictures = Pictures(scene, camera, device.tables, device.motion, device.rest, config.seed)
     return Inside(device, door, pictures)
 
 

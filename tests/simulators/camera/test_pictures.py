@@ -8,13 +8,19 @@ import cv2
 import numpy as np
 import pytest
 
+from services.simulators.camera import Config
+from services.simulators.camera.motors import Pose
+from services.simulators.camera.program import inside
 from services.simulators.camera.view import prints
 from services.simulators.camera.view.optics import distort, project, rays, undistort, window
 from services.simulators.camera.view.picture import blurred
 from services.simulators.camera.view.scene import Scene
 from services.simulators.world import World
+from services.vision.frames import Transform
 from tests.simulators.camera.edges import refined
 
+NOON = 1_784_200_000.0
+GOAL = Pose(80.0, 40.0, 0.0)
 FOUND = [("Living room", 582), ("Kitchen", 17), ("TV", 100), ("Sofa", 582), ("Dining", 17)]
 
 
@@ -129,6 +135,37 @@ def test_the_same_seed_draws_the_same_picture(world: World) -> None:
     view, pose = window(camera.lens, 1.0, 352, 198), camera.pose(90.0, 30.0)
     one, other = (Scene(world, camera.lens, seed=5).draw(pose, view) for _ in range(2))
     assert np.array_equal(one, other)
+
+
+def test_what_is_seen_at_rest_is_drawn_in_the_turn_and_is_the_same(
+    config: Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera, plain = inside(config, NOON), inside(config, NOON)
+    camera.pictures.ahead("ExtraFormat")  # nothing turns yet
+    for one in (camera, plain):
+        one.device.ptz.motors.go(GOAL, NOON)
+    seen = [camera.pictures.frame("ExtraFormat", NOON + 0.2)]
+    camera.pictures.ahead("ExtraFormat")
+    camera.pictures.ahead("ExtraFormat")
+    seen += [camera.pictures.frame("ExtraFormat", NOON + at) for at in (0.3, 10.0)]
+    same = [plain.pictures.frame("ExtraFormat", NOON + at) for at in (0.2, 0.3, 10.0)]
+    assert all(np.array_equal(one, other) for one, other in zip(seen, same, strict=True))
+    drawn: list[Transform] = []
+    monkeypatch.setattr(Scene, "draw", lambda scene, pose, view: drawn.append(pose))
+    camera.pictures.frame("ExtraFormat", NOON + 11.0)
+    camera.pictures.ahead("ExtraFormat")
+    assert not drawn
+
+
+def test_where_somebody_is_to_stop_a_turn_nothing_is_drawn_ahead(
+    config: Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera = inside(config, NOON)
+    camera.device.ptz.motors.start("Left", 1, 4, NOON, flip=False, mirror=False)
+    monkeypatch.setattr(Scene, "draw", lambda scene, pose, view: pytest.fail("nobody knows where it will look"))
+    camera.pictures.ahead("ExtraFormat")
+    camera.pictures.ahead("ExtraFormat")
+    assert camera.device.rest() is None
 
 
 def test_a_picture_is_drawn_quickly_enough(scene: Scene, world: World) -> None:

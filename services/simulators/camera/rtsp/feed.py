@@ -79,6 +79,7 @@ class Feed:
             if self._camera.shows_pictures or first:
                 first = False
                 drawn.put((time.monotonic() + LATENCY_S[self._stream], self._picture()))
+                self._camera.pictures.ahead(self._stream)
             due = max(due + 1 / self._camera.pictures.fps(self._stream), time.monotonic())
         drawn.put(None)
         sender.join()

@@ -47,11 +47,19 @@ class Pictures:
     """The newest picture of each stream as JPEG; the same one until the next frame is due. For several threads."""
 
     def __init__(
-        self, scene: Scene, camera: WorldCamera, tables: Tables, motors: Callable[[float], tuple[Pose, Pose]], seed: int
+        self,
+        scene: Scene,
+        camera: WorldCamera,
+        tables: Tables,
+        motors: Callable[[float], tuple[Pose, Pose]],
+        rest: Callable[[], Pose | None],
+        seed: int,
     ) -> None:
-        self._scene, self._camera, self._tables, self._motors = scene, camera, tables, motors
+        self._scene, self._camera, self._tables, self._motors, self._rest = scene, camera, tables, motors, rest
         self._lock = Lock()
         self._stills: dict[Stream, Still] = {}
+        self._ahead: dict[Stream, Still] = {}
+        self._goals: dict[Stream, Pose | None] = {}
         self._newest: dict[Stream, tuple[object, bytes]] = {}
         self._rng = np.random.default_rng(seed)
         self._tallies: dict[Stream, Tally] = {stream: Tally() for stream in STREAMS}
@@ -81,6 +89,19 @@ class Pictures:
         """The picture of this moment (BGR), made anew."""
         with self._lock:
             return self._developed(stream, *self._motors(now), self.light(now))
+
+    def ahead(self, stream: Stream) -> None:
+        """Draws what the camera will see at rest, where its firmware drives it to: a machine that needs longer for a
+        picture than a frame lasts is late in the turn then, where pictures are smeared, and not at its end. Not in a
+        turn's first moment either, which tells when it began.
+        """
+        with self._lock:
+            pose, before = self._rest(), self._goals.get(stream)
+            self._goals[stream] = pose
+            if pose is not None and pose == before and not self._tables.covered:
+                view = self._window(pose, self.size(stream))
+                if self._kept(stream, pose, view) is None:
+                    self._ahead[stream] = self._drawn(pose, view)
 
     def jpeg(self, stream: Stream, now: float) -> bytes:
         """The picture of this moment, encoded."""
@@ -124,11 +145,17 @@ class Pictures:
 
     def _still(self, stream: Stream, pose: Pose, view: Window) -> Still:
         """Drawn anew only when the camera has moved."""
-        moved, still = self._scene.changes, self._stills.get(stream)
-        if still is None or (still.pose, still.window, still.boards) != (pose, view, moved):
-            still = Still(pose, view, self._scene.draw(self._camera.pose(pose.pan, pose.tilt), view), moved)
-            self._stills[stream] = still
-        return still
+        self._stills[stream] = self._kept(stream, pose, view) or self._drawn(pose, view)
+        return self._stills[stream]
+
+    def _kept(self, stream: Stream, pose: Pose, view: Window) -> Still | None:
+        kept = [stills[stream] for stills in (self._stills, self._ahead) if stream in stills]
+        shows = (pose, view, self._scene.changes)
+        return next((still for still in kept if (still.pose, still.window, still.boards) == shows), None)
+
+    def _drawn(self, pose: Pose, view: Window) -> Still:
+        image = self._scene.draw(self._camera.pose(pose.pan, pose.tilt), view)
+        return Still(pose, view, image, self._scene.changes)
 
     def _sweep(self, pose: Pose, rates: Pose, view: Window) -> Array:
         """How many pixels the middle of the picture moves during an exposure."""
