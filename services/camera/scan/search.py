@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
 from typing import Literal, cast
 
 from services.camera.plan import Plan, attempt, wait
@@ -29,6 +28,7 @@ ANALYSE_S = 30.0  # longest wait for the next frame to be looked at
 LIGHT_S = 1.5  # after a change of the picture's mode it exposes anew: 1 to 2 s
 BACK_S = 180.0  # a camera that went away may be restarting: 40 to 105 s were seen
 PATIENCE = 3  # times that it may go away in one scan
+VISITS = 3  # of a place in one mode of the picture: what is missing then does not come
 RESTORED_S = 5.0
 STEP_S = 0.05
 
@@ -259,10 +259,11 @@ class Scan:
 
     def _nearest(self, place: Place, way: Sequence[Place]) -> bool:
         """Whether a stop there costs least now; `way` begins where the camera is, the second turn where it ends."""
-        if len(way) < 2:
+        if not way:
             return True
         more = detours(place, way, self.limits, self.skill)
-        return more[0] <= min(*more[1:-1], more[-1] * (2 if self.turn == 1 and self.second == "always" else 1), inf)
+        more[-1] *= 2 if self.turn == 1 and self.second == "always" else 1
+        return more[0] <= min(more)
 
     def _short(self, now: float) -> list[Spot]:
         """The visits of which it is known that frames are missing, and that they are needed."""
@@ -271,6 +272,8 @@ class Scan:
         return [spot for spot in self.spots if spot.over and spot.got < spot.wanted and self._needed(spot)]
 
     def _needed(self, spot: Spot) -> bool:
+        if sum((one.place, one.mode) == (spot.place, spot.mode) for one in self.spots) >= VISITS:
+            return False
         whole = self.second == "always" or not self.stop_early
         return whole or (spot.got <= spot.wanted // 2 and self.findings.worth(self.routine[spot.place]))
 

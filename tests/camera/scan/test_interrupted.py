@@ -164,9 +164,10 @@ def test_places_whose_frames_are_broken_are_visited_once_more(trial: VirtualScan
 
 def test_a_scan_of_which_nothing_can_be_read_fails_with_the_reason(trial: VirtualScan) -> None:
     trial.service.scanner.analyst = lambda: Seer(trial, {}, fails=lambda number: "expected a whole JPEG")
-    _, _, last = trial.run(ORDER)
+    scan, _, last = trial.run(ORDER)
     assert last.state == "failed"
     assert "no picture of Sofa" in last.reason
+    assert len(scan.spots) <= 3 * 2 * len(PLACES), "it does not try for ever"
     assert "expected a whole JPEG" in last.reason
 
 
