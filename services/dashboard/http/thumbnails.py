@@ -24,6 +24,7 @@ from services.whole_file import write_whole
 log = logging.getLogger(__name__)
 TOPIC = "/dashboard/thumbnails/"  # our own: the places of a camera that have one, and since when (ms)
 LOOK_S = 1.0
+STANDS_S = 3.0  # so long it stood there: the newest picture is up to a second old, and the first ones are still soft
 AGAIN_S = 3600.0  # a younger one is not taken again
 AFTER_FAILURE_S = 120.0
 
@@ -37,15 +38,20 @@ class Thumbnails:
         self._taken: dict[tuple[str, str], tuple[float, bytes]] = {}
         self._asked: set[tuple[str, str]] = set()  # the disk was asked once; what comes later comes from us
         self._not_before: dict[str, float] = {}
+        self._stands: dict[str, tuple[str, float]] = {}  # by camera, at which place and since when
 
     async def run(self) -> None:
         """Until it is cancelled."""
         while True:
             await asyncio.sleep(LOOK_S)
-            for camera in self.house.config.cameras:
-                place = self._due(camera, time.time())
-                if place is not None:
-                    await self._take(camera, place)
+            await self.look(time.time())
+
+    async def look(self, now: float) -> None:
+        """Takes those that are due; called again and again."""
+        for camera in self.house.config.cameras:
+            place = self._due(camera, now)
+            if place is not None:
+                await self._take(camera, place, now)
 
     def get(self, camera: str, place: str) -> bytes | None:
         """The picture of a place."""
@@ -53,19 +59,24 @@ class Thumbnails:
         return found[1] if found else None
 
     def _due(self, camera: str, now: float) -> str | None:
-        """The place whose picture is to be taken now: the camera stands there, and does nothing else."""
+        """The place whose picture is to be taken now: the camera has stood there a while, and does nothing else."""
         text = self.house.latest(topics.CAMERA_POSITION.name(cam=camera))
         scan = self.house.latest(topics.CAMERA_SCAN_STATE.name(cam=camera))
         self._tell(camera)
+        before = self._stands.pop(camera, None)
         if text is None or (scan and json.loads(scan)["state"] == "running") or now < self._not_before.get(camera, 0):
             return None
         position = Position.model_validate_json(text)
         if position.moving or position.place is None:
             return None
+        since = before[1] if before is not None and before[0] == position.place else now
+        self._stands[camera] = position.place, since
+        if now - since < STANDS_S:
+            return None
         found = self._known(camera, position.place)
         return position.place if found is None or now - found[0] > AGAIN_S else None
 
-    async def _take(self, camera: str, place: str) -> None:
+    async def _take(self, camera: str, place: str, now: float) -> None:
         url = self.house.picture_of(camera, SNAPSHOT)
         if url is None:
             return
@@ -73,17 +84,18 @@ class Thumbnails:
             data = await self.videos.snapshot(url)
         except Unavailable as error:
             log.info("no picture of %s at %s: %s", camera, place, error)
-            self._not_before[camera] = time.time() + AFTER_FAILURE_S
+            self._not_before[camera] = now + AFTER_FAILURE_S
             return
         text = self.house.latest(topics.CAMERA_POSITION.name(cam=camera))
-        if text is None or Position.model_validate_json(text).place != place:
+        there = Position.model_validate_json(text) if text is not None else None
+        if there is None or there.moving or there.place != place:
             return  # it has turned away meanwhile
         small = await asyncio.to_thread(smaller, data)
         if small is not None:
-            self._taken[camera, place] = (time.time(), small)
+            self._taken[camera, place] = (now, small)
             self._write(camera, place, small)
         else:
-            self._not_before[camera] = time.time() + AFTER_FAILURE_S
+            self._not_before[camera] = now + AFTER_FAILURE_S
         self._tell(camera)
 
     def _tell(self, camera: str) -> None:
