@@ -26,6 +26,7 @@ DARK_BORDER = 0.75  # share of the border's cells that must be dark: a finger ma
 EDGED = 0.7  # share of the outline with lighter paper beside it
 EDGED_SIDE = 0.2  # of the worst side
 STEPPED = 0.5  # share of the borders within the code at which there is a step; half hidden markers have 0.64
+DEEP = 0.45  # as deep as the border are the dark cells, by this much: in a dark frame, a photograph's shades are not
 MARGIN = 0.09  # of the correlation above the next id's
 SURE_CORRELATION = 0.97  # above which neighbours in the dictionary may be nearer
 LIKENESS = 0.62  # share of what is seen within the border that the code explains; one in a hundred markers is below 0.7
@@ -36,7 +37,9 @@ SMALL_CELL_PX = 2.2  # side of a cell below which proof is taken off
 PER_PX = 20.0
 NARROW = 1.15  # the narrow side of a square counts so much, where that is less than the root of its area
 SIMPLE = 12.0  # a code with so much taken off is one that pictures imitate:
-SIMPLE_CELL_PX = 3.0  # it must be this large
+SIMPLE_CELL_PX = 3.0  # it must be this large,
+SIMPLE_LIKENESS = 0.76  # and what is seen so much like it;
+STRIPED_LIKENESS = 0.9  # or so much, where it is stripes: those of a picture in a frame are as long as the frame
 
 
 def plausible(look: Evidence) -> NDArray[np.bool_]:
@@ -49,16 +52,28 @@ def beliefs(book: Book, match: Match, proof: Evidence, squares: Array, noise: fl
     cells = book.inner**2
     left = np.maximum(1 - match.correlation**2, 1e-6)
     chance = np.log(4 * ids) + (cells - 2) / 2 * np.log(left)
-    simple = PER_EDGE * np.maximum(book.edges.mean() - SIMPLER - book.edges[match.row], 0)
-    simple = simple + STRIPES * book.stripes[match.row]
+    simple = _simple(book, match.row)
     cell_px = _side(squares) / book.modules
     belief = -chance - simple - PER_PX * np.maximum(SMALL_CELL_PX - cell_px, 0)
     sound = (proof.dark >= DARK_BORDER) & (proof.edged >= EDGED) & (proof.worst >= EDGED_SIDE)
-    sound &= proof.stepped >= STEPPED
+    sound &= (proof.stepped >= STEPPED) & (proof.deep >= DEEP)
     sound &= proof.contrast >= np.maximum(LEAST_CONTRAST, CONTRAST_NOISES * noise)
     sound &= (match.correlation - match.second >= MARGIN) | (match.correlation >= SURE_CORRELATION)
     sound &= (simple < SIMPLE) | (cell_px >= SIMPLE_CELL_PX)
     return np.where(sound, np.maximum(belief, 0), 0.0)
+
+
+def least_likeness(book: Book, marker: int) -> float:
+    """How much like a marker what is seen must be, pixel by pixel (`reading.likeness`)."""
+    if book.stripes[marker]:
+        return STRIPED_LIKENESS
+    return SIMPLE_LIKENESS if _simple(book, np.array([marker]))[0] >= SIMPLE else LIKENESS
+
+
+def _simple(book: Book, rows: NDArray[np.intp]) -> Array:
+    """What is taken off for simple figures."""
+    edges = np.maximum(book.edges.mean() - SIMPLER - book.edges[rows], 0)
+    return np.asarray(PER_EDGE * edges + STRIPES * book.stripes[rows], float)
 
 
 def _side(squares: Array) -> Array:

@@ -204,7 +204,7 @@ class _Search:
         """Whether it looks like the code all over, not only in the middle of the cells."""
         faces = codes.faces(self.dictionary, one.marker)
         like = reading.likeness(one.look.grey, one.look.here(one.corners), faces, one.look.noise)
-        return like >= belief.LIKENESS
+        return like >= belief.least_likeness(self.book, one.marker)
 
     def _read(self, look: Look, rough: Array) -> Iterator[_Candidate]:
         """Reads twice: roughly, to drop nearly all of them, and again with better corners."""

@@ -33,6 +33,18 @@ def test_nothing_is_invented_amid_what_looks_like_markers() -> None:
     assert [one for seed in range(80) for one in trials.false_ones(seed)] == []
 
 
+@pytest.mark.parametrize(
+    ("seed", "what"),
+    [
+        (29614477, "a white box in a dark bar: a part of another marker"),
+        (78820619, "shades within a frame, like a code out of focus"),
+        (9721815, "stripes within a frame"),
+    ],
+)
+def test_what_was_once_taken_for_a_marker_is_none(seed: int, what: str) -> None:
+    assert trials.false_ones(seed) == [], what
+
+
 def test_hard_photographs_are_read_where_opencv_gives_up() -> None:
     ours, theirs, false = trials.recall(range(500, 540), hard=True)
     assert false == 0

@@ -25,8 +25,10 @@ from rich.console import Console
 from rich.table import Table
 
 from services.simulators.camera.view.optics import project
+from services.simulators.camera.view.prints import paper
 from services.simulators.camera.view.solids import boxes
 from services.simulators.world import Marker, World, load
+from services.vision.frames import Array
 from tests import bounds
 from tests.camera.scan.virtual_scan import CONFIG, FRAMES, VirtualScan, virtual_scan
 
@@ -95,6 +97,11 @@ def shown_well(world: World, trial: VirtualScan, marker: Marker, places: list[st
         if (ahead[:, 2] < 0.2).any() or normal @ to_eye < FACING * np.linalg.norm(to_eye):
             continue
         pixels = project(ahead, camera.lens)
+        nearer = [
+            one for one in world.markers if dist(one.position, pose.translation) < dist(points[4], pose.translation)
+        ]
+        if any(_overlap(pixels[:4], project(pose.inverse().apply(paper(one)), camera.lens)) for one in nearer):
+            continue  # another sheet may lie over it
         inside = (pixels > FRAME_PX).all() and (
             pixels < (camera.lens.width - FRAME_PX, camera.lens.height - FRAME_PX)
         ).all()
@@ -103,6 +110,11 @@ def shown_well(world: World, trial: VirtualScan, marker: Marker, places: list[st
         if inside and side >= WELL_PX and not any(box.hides(pose.translation, points).any() for box in things):
             return True
     return False
+
+
+def _overlap(one: Array, other: Array) -> bool:
+    """Whether two convex outlines in the picture have a part in common."""
+    return bool(cv2.intersectConvexConvex(one.astype(np.float32), other.astype(np.float32))[0] > 0)
 
 
 @dataclass(frozen=True)
