@@ -39,7 +39,8 @@ NARROW = 1.15  # the narrow side of a square counts so much, where that is less 
 SIMPLE = 12.0  # a code with so much taken off is one that pictures imitate:
 SIMPLE_CELL_PX = 3.0  # it must be this large,
 SIMPLE_LIKENESS = 0.76  # and what is seen so much like it;
-STRIPED_LIKENESS = 0.9  # or so much, where it is stripes: those of a picture in a frame are as long as the frame
+STRIPED_LIKENESS = 0.9  # or so much, where it is stripes: those of a picture in a frame are as long as the frame,
+STRIPED_UNEVEN = 0.25  # and the frame is narrower than a cell, so that its cells differ more than so
 
 
 def plausible(look: Evidence) -> NDArray[np.bool_]:
@@ -59,6 +60,7 @@ def beliefs(book: Book, match: Match, proof: Evidence, squares: Array, noise: fl
     sound &= (proof.stepped >= STEPPED) & (proof.deep >= DEEP)
     sound &= proof.contrast >= np.maximum(LEAST_CONTRAST, CONTRAST_NOISES * noise)
     sound &= (match.correlation - match.second >= MARGIN) | (match.correlation >= SURE_CORRELATION)
+    sound &= ~book.stripes[match.row] | (proof.uneven <= STRIPED_UNEVEN)
     sound &= (simple < SIMPLE) | (cell_px >= SIMPLE_CELL_PX)
     return np.where(sound, np.maximum(belief, 0), 0.0)
 

@@ -66,7 +66,8 @@ class Evidence:
     `contrast`: grey levels between light and dark cells; `dark`: share of the border's cells nearer to dark than to
     light; `edged`: share of the outline with lighter paper beside it, `worst` the same of its worst side. `stepped`:
     share of the borders between a light and a dark cell at which the grey really steps; 1 where there are none. `deep`:
-    how far below the light cells the dark ones lie, where the border lies 1 below.
+    how far below the light cells the dark ones lie, where the border lies 1 below. `uneven`: by how much the border's
+    cells differ, as a share of the contrast.
     """
 
     contrast: Array
@@ -75,6 +76,7 @@ class Evidence:
     worst: Array
     stepped: Array
     deep: Array
+    uneven: Array
 
 
 def cells(grey: Picture, squares: Array, modules: int) -> Cells:
@@ -172,7 +174,8 @@ def _evidence(found: Cells, high: Array, low: Array, stepped: Array) -> Evidence
     edged = found.outside - found.border > LIGHTER * np.maximum(contrast, 1.0)[:, None, None]
     sides = edged.mean(axis=2)
     deep = contrast / np.maximum(high - found.border.mean(axis=(1, 2)), 1.0)
-    return Evidence(contrast, dark, sides.mean(axis=1), sides.min(axis=1), stepped, deep)
+    uneven = np.ptp(found.border, axis=(1, 2)) / np.maximum(contrast, 1.0)
+    return Evidence(contrast, dark, sides.mean(axis=1), sides.min(axis=1), stepped, deep, uneven)
 
 
 def likeness(grey: Picture, square: Array, faces: NDArray[np.float32], noise: float) -> float:

@@ -39,6 +39,7 @@ def test_nothing_is_invented_amid_what_looks_like_markers() -> None:
         (29614477, "a white box in a dark bar: a part of another marker"),
         (78820619, "shades within a frame, like a code out of focus"),
         (9721815, "stripes within a frame"),
+        (34874345, "one light stripe within a narrow frame"),
     ],
 )
 def test_what_was_once_taken_for_a_marker_is_none(seed: int, what: str) -> None:
