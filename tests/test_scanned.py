@@ -40,6 +40,19 @@ def test_a_marker_is_drawn_where_it_was_found() -> None:
     assert low - high == pytest.approx(160, abs=3)
 
 
+def test_the_figures_of_many_markers_are_all_within_the_picture() -> None:
+    def told(markers: int) -> tuple[int, int]:
+        marks = [Mark(600 + number, (1.0, 1.0), true=(1.1, 1.0)) for number in range(markers)]
+        image = draw(Plan("ip1", ROOMS, MOUNT, {}, marks))
+        below = image[round(4.2 * 160) + 2 :]  # without the line between
+        assert (below[:, -6:] == 255).all(), "nothing is cut off at the right"
+        return len(below), int((below < 128).all(axis=2).sum())
+
+    (rows, ink), (more_rows, more_ink) = told(2), told(20)
+    assert more_rows > rows
+    assert more_ink > 5 * ink / 2
+
+
 def test_the_ellipse_holds_nine_in_ten() -> None:
     rng = np.random.default_rng(1)
     covariance = np.array([[4e-4, 1.5e-4], [1.5e-4, 1e-4]])

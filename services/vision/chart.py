@@ -20,12 +20,13 @@ Colour = tuple[int, int, int]
 
 PER_M = 160  # pixels per metre
 EDGE_M = 0.6
-LEGEND_PX = 150
+MARGIN_PX, ROW_PX = 12, 30  # of what is told below the plan
 TABLE_M = 0.8  # the height at which a place's line of sight is drawn to end
 REACH_M = 4.0  # and where it does not go down so far
 NINETY = 4.605  # chi-square of two numbers: nine in ten lie inside
 LARGER = 10  # times: an ellipse of a centimetre cannot be seen
 FONT = cv2.FONT_HERSHEY_SIMPLEX
+TOLD = 0.55  # size of the letters below the plan
 INK, GREY, WALL = (40, 40, 40), (150, 150, 150), (120, 120, 120)
 ROOM, PAPER = (240, 245, 247), (255, 255, 255)
 BLUE, GREEN, RED = (190, 110, 20), (60, 140, 40), (40, 40, 210)
@@ -67,7 +68,7 @@ def draw(plan: Plan) -> Image:
     paper.text("camera", (here[0] + 0.09, here[1] - 0.16), BLUE)
     for mark in plan.marks:
         paper.mark(mark)
-    paper.legend(plan)
+    paper.legend()
     return paper.image
 
 
@@ -101,8 +102,10 @@ class _Paper:
         corners += [mark.found or mark.true or (0.0, 0.0) for mark in plan.marks] + [plan.mount.position[:2]]
         low, high = np.min(corners, axis=0) - EDGE_M, np.max(corners, axis=0) + EDGE_M
         self.low, self.high = low, high
-        width, height = np.ceil((high - low) * PER_M).astype(int)
-        self.image: Image = np.full((int(height) + LEGEND_PX, int(width), 3), PAPER, np.uint8)
+        width, height = (int(side) for side in np.ceil((high - low) * PER_M))
+        self.told = _told(plan, width - 2 * MARGIN_PX)
+        self.top = height
+        self.image: Image = np.full((height + ROW_PX * (len(self.told) + 1), width, 3), PAPER, np.uint8)
 
     def pixel(self, at: Sequence[float]) -> tuple[int, int]:
         x, y = (float(at[0]) - self.low[0]) * PER_M, (self.high[1] - float(at[1])) * PER_M
@@ -148,24 +151,35 @@ class _Paper:
         cv2.putText(self.image, plain, (x, y), FONT, size, PAPER, thick + 3, cv2.LINE_AA)
         cv2.putText(self.image, plain, (x, y), FONT, size, colour, thick, cv2.LINE_AA)
 
-    def legend(self, plan: Plan) -> None:
+    def legend(self) -> None:
         """What the signs mean, and in figures how far each marker is from where it truly is."""
-        top = self.image.shape[0] - LEGEND_PX
+        top = self.top
         cv2.line(self.image, (0, top), (self.image.shape[1], top), GREY, 1)
-        lines = [
-            (plan.title, INK),
-            (f"red: found; ellipses hold nine in ten, as they are and {LARGER} times as large", RED),
-        ]
-        lines += (
-            [("green cross: where it truly is (simulated)", GREEN)] if any(mark.true for mark in plan.marks) else []
-        )
-        lines += [("; ".join(map(_figures, plan.marks)), INK)] if plan.marks else [("no marker was found", INK)]
-        for number, (words, colour) in enumerate(lines):
-            plain = words.encode("ascii", "replace").decode()
-            cv2.putText(self.image, plain, (12, top + 30 + 30 * number), FONT, 0.55, colour, 1, cv2.LINE_AA)
-        metre = (12, top - 14), (12 + PER_M, top - 14)
+        for row, (words, colour) in enumerate(self.told, 1):
+            cv2.putText(self.image, words, (MARGIN_PX, top + ROW_PX * row), FONT, TOLD, colour, 1, cv2.LINE_AA)
+        metre = (MARGIN_PX, top - 14), (MARGIN_PX + PER_M, top - 14)
         cv2.line(self.image, *metre, INK, 3)
         cv2.putText(self.image, "1 m", (18 + PER_M, top - 9), FONT, 0.5, INK, 1, cv2.LINE_AA)
+
+
+def _told(plan: Plan, width: int) -> list[tuple[str, Colour]]:
+    """The rows below the plan, none of them wider than so many pixels if its parts are not."""
+    parts = [([plan.title], INK)]
+    parts += [([f"red: found; ellipses hold nine in ten, as they are and {LARGER} times as large"], RED)]
+    if any(mark.true for mark in plan.marks):
+        parts += [(["green cross: where it truly is (simulated)"], GREEN)]
+    parts += [(list(map(_figures, plan.marks)) or ["no marker was found"], INK)]
+    return [(row, colour) for words, colour in parts for row in _rows(words, width)]
+
+
+def _rows(parts: Sequence[str], width: int) -> list[str]:
+    rows: list[str] = []
+    for part in parts:
+        plain = part.encode("ascii", "replace").decode()  # OpenCV's letters
+        longer = f"{rows[-1]}; {plain}" if rows else plain
+        fits = bool(rows) and cv2.getTextSize(longer, FONT, TOLD, 1)[0][0] <= width
+        rows[-1:] = [longer] if fits else [*rows[-1:], plain]
+    return rows
 
 
 def _figures(mark: Mark) -> str:
