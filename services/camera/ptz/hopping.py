@@ -3,7 +3,7 @@
 A hop may begin while the last one, or a start at full speed, still turns. Where it leads depends on where the camera
 was just then: that is known when it was answered, not before, so the last hop of a long way leaves some degrees to
 one more that begins at rest. A late hop pushes nothing against a stop. Not here: how an axis glides (`glide.py`), how
-large the scale is (`scale.py`).
+large the scale is (`planes.py`), what hops teach (`scale.py`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from services.camera.ptz.driving import at_rest
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE
-from services.camera.ptz.scale import FORM, Hop
+from services.camera.ptz.scale import FORM, Hop, Turned
 from services.camera.requests import MoveOver, Reading, Refused, Reply, Status
 
 MOST = 6  # hops without a rest
@@ -89,7 +89,7 @@ class Hopping:
         ways = {axis: helm.aim[axis] - helm.course.origin[axis] for axis in (PAN, TILT)}
         rates = {axis: helm.skill.paces[axis].rate(helm.skill.paces[axis].speeds[-1]) for axis in ways}
         lead = max(ways, key=lambda axis: abs(ways[axis]) / rates[axis])
-        safe = abs(ways[lead]) + self._room(lead, ways[lead]) - rates[lead] * timing.tail
+        safe = abs(ways[lead]) + self._room(lead, ways[lead]) - rates[lead] * timing.tail - self._brakes(lead)
         held = min(abs(ways[lead]) - self._before(lead), safe) / rates[lead]
         if held < BULK * timing.usual:
             return now
@@ -113,9 +113,13 @@ class Hopping:
     def _before(self, axis: int) -> float:
         """How far before its goal a hop should begin that leads there: within its reach, and before it would brake."""
         pace, reach = self.helm.skill.paces[axis], self._reach(axis, self.helm.course.origin[ZOOM])
-        rate = pace.rate(pace.speeds[-1])
-        brakes = rate * rate * pace.other(HALF_CHANGE)
-        return max((reach + brakes) / 2, reach - rate * self.helm.skill.timing.spread)
+        spread = pace.rate(pace.speeds[-1]) * self.helm.skill.timing.spread
+        return max((reach + self._brakes(axis)) / 2, reach - spread)
+
+    def _brakes(self, axis: int) -> float:
+        """How far it goes while it brakes from its top speed."""
+        pace = self.helm.skill.paces[axis]
+        return pace.rate(pace.speeds[-1]) ** 2 * pace.other(HALF_CHANGE)
 
     def _room(self, axis: int, way: float) -> float:
         low, high = self.helm.limits.ranges[axis]
@@ -132,13 +136,13 @@ class Hopping:
 
     def _reach(self, axis: int, zoom: float) -> float:
         """How far one hop goes at most, degrees."""
-        return scale.angle(MIDDLE, scale.plane(zoom, self.helm.skill)[axis])
+        return scale.angle(MIDDLE, self.helm.skill.planes.at(zoom)[axis])
 
     def _send(self, now: float, most: float = 90.0) -> Plan[float]:
         """One hop towards the goal, from where it will be when that takes effect."""
         helm = self.helm
         there = [self._at(axis, now + helm.skill.timing.usual)[0] for axis in range(3)]
-        planes, parts = scale.plane(there[ZOOM], helm.skill), []
+        planes, parts = helm.skill.planes.at(there[ZOOM]), []
         for axis in (PAN, TILT):
             reach = min(most, self._reach(axis, there[ZOOM]))
             way = min(reach, max(-reach, helm.aim[axis] - there[axis]))
@@ -160,11 +164,12 @@ class Hopping:
         late = reply.received - reply.sent - helm.skill.timing.usual
         acted = reply.received - helm.skill.paces[PAN].other(ACT_PART) * late
         poses = [self._at(axis, acted) for axis in range(3)]
-        planes = scale.plane(poses[ZOOM][0], helm.skill)
+        planes = helm.skill.planes.at(poses[ZOOM][0])
         right, down = (
             scale.angle(part, planes[axis]) * helm.skill.senses[axis].sign
             for axis, part in enumerate((request.right, request.down))
         )
+        turned = None if self.glides else self._turned(acted, reply, late)
         self.glides = []
         for axis, (way, (place, speed)) in enumerate(zip((right, down, request.zoom), poses, strict=True)):
             low, high = helm.limits.ranges[axis]
@@ -172,9 +177,21 @@ class Hopping:
             top, slow = pace.rate(pace.speeds[-1]), 2 * pace.other(HALF_CHANGE)
             goal = min(high, max(low, place + way))
             self.glides.append(Glide(acted, place, speed, goal, top, 1 / slow, reply.received))
-        begun = (poses[PAN][0], poses[TILT][0], poses[ZOOM][0])
-        self.hops.append(Hop(begun, (right, down, request.zoom), (poses[PAN][1], poses[TILT][1], poses[ZOOM][1])))
+        begun, speeds = ((pan, tilt, zoom) for pan, tilt, zoom in zip(*poses, strict=True))
+        tops = (self.glides[PAN].top, self.glides[TILT].top, self.glides[ZOOM].top)
+        self.hops.append(Hop(begun, (right, down, request.zoom), speeds, tops, turned))
         helm.course.leave(begun)
+
+    def _turned(self, acted: float, reply: Reply, late: float) -> tuple[Turned, Turned]:
+        """What pan and tilt did until the first hop acted."""
+        course = self.helm.course
+        pan, tilt = (
+            Turned(
+                tuple(told), course.origin[axis] + course.shift[axis], course.doubt(axis, acted), reply.received, late
+            )
+            for axis, told in enumerate(course.told[:ZOOM])
+        )
+        return pan, tilt
 
     def _at(self, axis: int, when: float) -> tuple[float, float]:
         """Place and speed of an axis."""

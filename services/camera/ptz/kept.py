@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from services.camera.ptz.pace import Pace
+from services.camera.ptz.planes import Planes
 from services.camera.ptz.skill import KEEP, Honours, Sense, Skill
 from services.camera.requests import Identity
 from services.whole_file import write_whole
@@ -22,7 +23,7 @@ Triple = tuple[float, float, float]
 log = logging.getLogger(__name__)
 
 
-class _Pace(BaseModel):
+class _Filter(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     mean: list[float]
     cov: list[list[float]]
@@ -34,8 +35,8 @@ class _Kept(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     serial: str
     firmware: str
-    paces: tuple[_Pace, _Pace, _Pace]
-    drives: tuple[_Pace, _Pace, _Pace]
+    paces: tuple[_Filter, _Filter, _Filter]
+    drives: tuple[_Filter, _Filter, _Filter]
     picture: tuple[bool, bool]
     senses: tuple[tuple[int, bool], tuple[int, bool]]
     took: list[float]
@@ -49,7 +50,7 @@ class _Kept(BaseModel):
     honours: dict[str, Honours]
     beside: dict[str, Pair]
     presets: dict[int, Triple]
-    planes: dict[float, Pair]
+    planes: _Filter | dict[float, Pair]  # a table, as it was kept once, is not taken in
 
 
 class Kept:
@@ -122,17 +123,26 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
         honours=skill.honours,
         beside=skill.beside,
         presets=skill.presets,
-        planes=skill.planes,
+        planes=_kept_filter(skill.planes),
     )
 
 
-def _paces(paces: tuple[Pace, Pace, Pace]) -> tuple[_Pace, _Pace, _Pace]:
-    pan, tilt, zoom = (_Pace(mean=one.mean.round(9).tolist(), cov=one.cov.round(12).tolist()) for one in paces)
+def _paces(paces: tuple[Pace, Pace, Pace]) -> tuple[_Filter, _Filter, _Filter]:
+    pan, tilt, zoom = map(_kept_filter, paces)
     return pan, tilt, zoom
 
 
+def _kept_filter(known: Pace | Planes) -> _Filter:
+    return _Filter(mean=known.mean.round(9).tolist(), cov=known.cov.round(12).tolist())
+
+
 def _take_in(kept: _Kept, skill: Skill) -> None:
-    for own, known in zip((*skill.paces, *skill.drives), (*kept.paces, *kept.drives), strict=True):
+    filters: list[tuple[Pace | Planes, _Filter]] = [
+        *zip((*skill.paces, *skill.drives), (*kept.paces, *kept.drives), strict=True)
+    ]
+    if isinstance(kept.planes, _Filter):
+        filters.append((skill.planes, kept.planes))
+    for own, known in filters:
         mean, cov = np.array(known.mean, float), np.array(known.cov, float)
         if mean.shape == own.mean.shape and cov.shape == own.cov.shape:
             own.mean, own.cov = mean, cov
@@ -145,4 +155,4 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
     skill.surprise, skill.arrives_late = kept.surprise, kept.arrives_late
     skill.steady = kept.steady
     skill.diagonals, skill.zoom_steps, skill.honours = kept.diagonals, kept.zoom_steps, kept.honours
-    skill.beside, skill.presets, skill.planes = kept.beside, kept.presets, kept.planes
+    skill.beside, skill.presets = kept.beside, kept.presets

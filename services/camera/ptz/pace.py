@@ -50,6 +50,7 @@ class Seen(NamedTuple):
     late: float
     travel: float
     noise: float  # standard deviation
+    acts: bool = False  # it tells of the moment when a command acts that was answered then
 
 
 Vector = NDArray[np.float64]
@@ -175,6 +176,8 @@ class Pace:
     def _shown(self, mean: Vector, told: Sequence[Told], seen: Seen) -> float:
         count = len(self.guess)
         at = seen.at + float(mean[count + READ_LATE]) + float(mean[count + READ_PART]) * seen.late
+        if seen.acts:
+            at = seen.at - float(mean[count + ACT_PART]) * seen.late
         return _travel(mean, count, told, at)[0]
 
 

@@ -1,46 +1,53 @@
-"""How large the scale of the relative form is: the tangent of its end, a point of the picture's plane. Pure."""
+"""What hops by the relative form teach: of its scale, and of the motor that turned before. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan, degrees, exp, hypot, log, radians, tan
+from math import atan, degrees, hypot, radians, sin
+
+import numpy as np
 
 from services.camera.ptz.course import PAN, TILT, ZOOM
-from services.camera.ptz.goal import Limits, Pose
+from services.camera.ptz.goal import EDGE_DEG, Limits, Pose
+from services.camera.ptz.pace import Seen, Told
+from services.camera.ptz.planes import growth
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Reading
 
 FORM = "Position"
 ZOOMS = "Position zoom"  # whether a hop takes zoom along
-PLANE_TAN = (1.0, 0.56)  # of the whole scale at the widest zoom, a guess to begin with
 STAYED_DEG = 0.3
 LEVEL = 1.0  # zoom is read in coarse steps
-LEAST_DEG, MOST_DEG = 3.0, 80.0  # hops that tell about the scale
-READ_DEG, TIME_S, ZOOM_DOUBT = 0.15, 0.02, 0.05  # of a reading; when a hop took effect; of a level's magnification
-DOUBT, LEVEL_DOUBT, FIRST_DOUBT = 0.015, 0.06, 0.5  # about the scale; at a level, or at all, before any was seen
+READ_DEG, TIME_S = 0.1, 0.003  # of a reading; when a hop took effect
+LEVELS = 0.5  # where zoom is while it turns
+SHARE = 0.8  # of the way that the first hop of a chain went; less tells little of the motor before it
+ALIKE = 2.0  # what each of two takes from one reading, the other took too: so often more doubt is left to both
+
+
+@dataclass(frozen=True)
+class Turned:
+    """How an axis was told to turn before a hop: from where, how far its place was in doubt, when that was over."""
+
+    told: tuple[Told, ...]
+    origin: float
+    doubt: float
+    answered: float
+    late: float  # how much later than usual it was answered
 
 
 @dataclass(frozen=True)
 class Hop:
-    """Where one began, how far it should go, and how fast each axis was then; degrees, levels."""
+    """Where one began, how far it should go, how fast each axis was then, and can be; degrees, levels.
+
+    `turned`: what pan and tilt did before, where the hop is the first one.
+    """
 
     begun: Pose
     ways: Pose
     speeds: Pose
-
-
-def plane(zoom: float, skill: Skill) -> tuple[float, float]:
-    """The tangents of the whole scale at a zoom: from what was seen at the nearest, or a guess."""
-    known = min(skill.planes, key=lambda other: abs(other - zoom), default=None)
-    pan, tilt = PLANE_TAN if known is None else skill.planes[known]
-    grown = larger(known or 0.0) / larger(zoom)
-    return pan * grown, tilt * grown
-
-
-def larger(zoom: float) -> float:
-    """How much the picture grows with zoom, about."""
-    return 1.0 + zoom / 4.0
+    tops: Pose
+    turned: tuple[Turned, Turned] | None
 
 
 def angle(part: float, whole: float) -> float:
@@ -58,33 +65,31 @@ def learn(skill: Skill, hops: Sequence[Hop], to: Pose, limits: Limits, reading: 
     if ZOOMS not in skill.honours and max(abs(hop.ways[ZOOM]) for hop in hops) >= LEVEL:
         skill.honours[ZOOMS] = "yes" if zoomed else "no"
     skill.zoomed = (reading.zoom, to[ZOOM]) if zoomed else None
-    for axis in (PAN, TILT):
-        _learn(skill, axis, _telling(hops, axis), there[axis] - to[axis], limits)
+    if skill.honours[FORM] == "yes":
+        for axis in (PAN, TILT):
+            low, high = limits.ranges[axis]
+            if low + EDGE_DEG < there[axis] < high - EDGE_DEG:
+                _learn(skill, axis, hops, there[axis] - to[axis])
 
 
-def _telling(hops: Sequence[Hop], axis: int) -> Hop:
-    """The longest of those that led there: a hop that another one followed in flight did not."""
-    led = [hops[-1]]
-    for hop in hops[-2::-1]:
-        if any(led[-1].speeds[:ZOOM]):
-            break
-        led.append(hop)
-    return max(led, key=lambda hop: abs(hop.ways[axis]))
-
-
-def _learn(skill: Skill, axis: int, hop: Hop, wrong: float, limits: Limits) -> None:
-    """It ended so far from where it should: by the scale, or by when it took effect, as far as each is in doubt."""
-    way = hop.ways[axis]
-    moved = abs(way) + (wrong if way > 0 else -wrong)
-    if hop.speeds[ZOOM] or abs(way) < LEAST_DEG or not 1.0 < moved < MOST_DEG:
+def _learn(skill: Skill, axis: int, hops: Sequence[Hop], wrong: float) -> None:
+    """It ended so far from where it should: by the scale, or by where the first hop began."""
+    skill.planes.age()
+    slope, noise, share, counts = np.zeros_like(skill.planes.mean), READ_DEG, 1.0, 1.0
+    for hop in reversed(hops):
+        share = counts
+        bends = share * degrees(sin(2 * radians(hop.ways[axis]))) / 2  # degrees, for a change of the logarithm by 1
+        slope += bends * skill.planes.weights(axis, hop.begun[ZOOM])
+        noise = hypot(noise, share * TIME_S * hop.speeds[axis])
+        if hop.speeds[ZOOM]:
+            noise = hypot(noise, bends * LEVELS * growth(hop.begun[ZOOM]))
+        counts *= max(0.0, 1.0 - abs(hop.speeds[axis]) / hop.tops[axis])  # in full flight it matters not where to
+    turned, scale = hops[0].turned, skill.planes.doubt(slope)
+    if turned is None:
+        skill.planes.learn(slope, wrong, noise)
         return
-    noise = (READ_DEG + TIME_S * abs(hop.speeds[axis])) / abs(way)
-    noise += 0.0 if hop.begun[ZOOM] in limits.zoom else ZOOM_DOUBT
-    level = float(round(hop.begun[ZOOM]))
-    doubt = DOUBT if level in skill.planes else LEVEL_DOUBT if skill.planes else FIRST_DOUBT
-    known = list(plane(hop.begun[ZOOM], skill))
-    grown = log(tan(radians(moved)) / tan(radians(abs(way))))
-    most = 2 * hypot(doubt, noise)
-    known[axis] *= exp(min(most, max(-most, grown)) * doubt**2 / (doubt**2 + noise**2))
-    there = larger(hop.begun[ZOOM]) / larger(level)
-    skill.planes[level] = (known[PAN] * there, known[TILT] * there)
+    skill.planes.learn(slope, wrong, hypot(noise, ALIKE * share * turned[axis].doubt))
+    if turned[axis].told and share > SHARE:
+        travel = hops[0].begun[axis] + wrong / share - turned[axis].origin
+        seen = Seen(turned[axis].answered, turned[axis].late, travel, ALIKE * hypot(noise, scale) / share, acts=True)
+        skill.paces[axis].learn(turned[axis].told, seen)

@@ -11,6 +11,7 @@ from statistics import median
 from typing import Literal
 
 from services.camera.ptz.pace import PAN_RATES, TILT_RATES, ZOOM_RATES, Pace
+from services.camera.ptz.planes import Planes
 
 Honours = Literal["unknown", "no", "pan", "yes"]  # of a way to let the firmware drive; pan: it ignores tilt
 DRIVES = (45.0, 27.0, 4.0)  # degrees/s, levels/s: the firmware's own moves, a guess to begin with
@@ -87,7 +88,7 @@ class Skill:
     honours: dict[str, Honours] = field(default_factory=dict)  # by form
     beside: dict[str, tuple[float, float]] = field(default_factory=dict)  # by form: pan and tilt off what was asked
     presets: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # readings where each was seen to be
-    planes: dict[float, tuple[float, float]] = field(default_factory=dict)  # by zoom: tangents of the whole scale
+    planes: Planes = field(default_factory=Planes)  # of the relative form
 
     def forget_senses(self, *, flip: bool, mirror: bool) -> None:
         """The picture's options changed, and these swap the motors: guess, and look at the next motion."""
