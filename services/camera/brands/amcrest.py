@@ -171,11 +171,11 @@ class Amcrest:
     def _set_picture(self, request: SetPicture) -> Picture:
         if request.mode is not None and self._in_day_night is None:
             self._picture()
-        elsewhere = request.mode is not None and self._in_day_night
-        if request.flip is not None or request.mirror is not None or not elsewhere:
+        mode = request.mode if self._in_day_night else None
+        if request.flip is not None or request.mirror is not None or mode is None:
             self._command(picture.set_picture(request))
-        if request.mode is not None and elsewhere:
-            self._command(picture.set_mode(request.mode, request.contrast))
+        if mode is not None:
+            self._command(picture.set_mode(mode, request.contrast))
         return self._picture()
 
     def _talk(self, dialogue: errands.Dialogue) -> object:
