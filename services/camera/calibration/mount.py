@@ -131,7 +131,7 @@ class Touring:
         low, high = self.limits.tilt
         goal = self.limits.goal(pan % 360.0, min(high - 0.5, max(low + 0.5, tilt)), self.limits.zoom[0])
         arrival = yield from goto(goal, self.limits, self.skill, now + MOVE_S)
-        return arrival.reading, arrival.at
+        return (yield from settle(arrival.reading))  # that one may be of the last bit of the way
 
     def _towards(self, marker: int) -> tuple[float, float]:
         """The readings that centre a marker, from how it was seen; the mount is not needed for that."""

@@ -90,7 +90,7 @@ def at_rest(
         seen.append(cast(Reading, reply.result))
         pose = helm.limits.pose(seen[-1])
         off = max(abs(pose[axis] - to[axis]) for axis in (PAN, TILT))
-        rests = helm.tells_rest(seen[-1])
+        rests = skill.tells_rest(seen[-1].moving)
         there = certain and off <= NEARER_DEG and (rests or not about)
         on = helm.beside(pose) and off <= about and rests
         still = len(seen) > 1 and same(seen[-2], seen[-1])

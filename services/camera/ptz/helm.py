@@ -160,10 +160,6 @@ class Helm:
         """Whether the camera says that it moves; some firmware says so for ever."""
         return reading.moving is True and not self.skill.always_moving
 
-    def tells_rest(self, reading: Reading) -> bool:
-        """Whether a reading tells by itself that the camera rests: its word was seen to change."""
-        return reading.moving is False and self.skill.says_moving and not self.skill.always_moving
-
     def _settled(self) -> float:
         """When a reading has to be asked for that shows everything at rest."""
         pace = self.skill.paces[PAN]

@@ -101,6 +101,10 @@ class Skill:
         """As near as that a reading has arrived, degrees."""
         return NEAR_DEG if self.steady >= STEADY else NEARER_DEG
 
+    def tells_rest(self, moving: bool | None) -> bool:
+        """Whether what the camera says of its motion tells by itself that it rests: its word was seen to change."""
+        return moving is False and self.says_moving and not self.always_moving
+
     def see_still(self, change: float) -> None:
         """Two readings of an axis at rest differ by so much."""
         if self.steady >= 0:

@@ -154,6 +154,7 @@ class Scan:
         except Away:
             self.spots.remove(spot)
             raise
+        self.near = spot.reading
         self.gather()
         return now
 

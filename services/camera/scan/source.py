@@ -138,6 +138,7 @@ class Source:
         footage, lead = self.stream.footage, self.skill.timing.usual
         footage.leave(now, now, turns=False)  # a visit of the same pose
         footage.open(spot)
+        now = yield from self._read_at_rest(spot, now)
         while now < footage.long_enough(spot) - lead and not spot.over:
             now = yield from wait(min(now + LOOK_S, max(now + 0.005, footage.long_enough(spot) - lead)))
             self._shot += self._collected()
@@ -196,7 +197,17 @@ class Source:
         """So long after it was sent, a command has not turned the camera yet."""
         return SURELY * min(self.skill.timing.took, default=0.0)
 
+    def _read_at_rest(self, spot: Spot, now: float) -> Plan[float]:
+        """What was read on arrival may be of the last bit of the way: read once more, while it stands anyway."""
+        if self.skill.tells_rest(spot.reading.moving):
+            return now
+        reply = yield from attempt(Status())
+        if isinstance(reply.result, Reading):
+            spot.reading = reply.result
+        return reply.received
+
     def _snapshots(self, spot: Spot, now: float) -> Plan[float]:
+        now = yield from self._read_at_rest(spot, now)
         now = yield from wait(max(now, spot.since + (SETTLE_S if self.settle_s is None else self.settle_s)))
         for _ in range(spot.wanted - spot.got):
             reply = yield from _snapshot()

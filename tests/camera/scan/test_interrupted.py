@@ -77,7 +77,7 @@ def test_missing_frames_are_fetched_on_the_way(trial: VirtualScan, place: str, m
     def some(glimpse: Glimpse) -> list[tuple[Visit, VideoFrame]]:
         scan = trial.service.scanner.scan
         of = [spot for spot in scan.spots if (spot.place, spot.mode) == (place, mode)] if scan is not None else []
-        if of and glimpse.like == "same" and 0.0 < footage.at(glimpse.frame) - of[0].since < 1.0:
+        if of and glimpse.like == "same" and 0.0 < footage.at(glimpse.frame) - of[0].since < 1.5:
             arrived.append(glimpse)
             return whole(glimpse) if len(arrived) <= 1 else []
         return whole(glimpse)

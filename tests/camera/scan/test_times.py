@@ -9,6 +9,7 @@ from statistics import mean
 import pytest
 
 from services.camera.scan.search import Scan
+from services.simulators.camera.motors import Pose
 from tests import bounds
 from tests.camera.scan.virtual_scan import VirtualScan, virtual_scan
 
@@ -38,6 +39,22 @@ def test_a_full_scan_takes_little_more_than_motors_and_frames_need_and_looks_at_
         factors.append(report / seconds)
     assert mean(ratios) <= bounds.SCAN_OVER_LEAST, ratios
     assert min(factors) >= bounds.SCAN_QUICKER, factors
+
+
+def test_a_frame_is_placed_by_a_reading_at_rest(trial: VirtualScan) -> None:
+    truth: dict[int, Pose] = {}
+
+    def watch(scan: Scan) -> None:
+        pose, speeds = trial.inside.device.motion(trial.flat.now)
+        if scan.spots and not any(speeds):
+            truth.setdefault(len(scan.spots), pose)
+
+    trial.sees({})
+    scan, _, _ = trial.run('{"full": true}', watch)
+    assert len(truth) == len(scan.spots) == 18
+    for spot, pose in zip(scan.spots, truth.values(), strict=True):
+        assert spot.reading.pan == pytest.approx(pose.pan, abs=0.051)
+        assert spot.reading.tilt == pytest.approx(pose.tilt, abs=0.051)
 
 
 def test_a_place_that_was_saved_zoomed_is_shown_whole_and_costs_no_correction(trial: VirtualScan) -> None:
