@@ -26,6 +26,7 @@ KNOWN_FROM = 8.0  # numbers that RANDOM_PX counts as against the frames' own sca
 SAME_PLACE_M, SAME_PLACE_DEG = 0.005, 0.2  # readings that differ by less are one place, read with a jitter
 SAME_FOCAL = 1e-3  # share; a zoom measured anew in each frame is the same zoom
 STAYED_PX, STAYED_SIDES = 1.0, 0.03  # corners of one place that are farther apart are not of one marker at rest
+COARSER = 2.0  # times; corners that are so much coarser add nothing to the others of a place
 HUBER = 1.5  # standard deviations of a frame from where it weighs less
 WEIGHINGS = 5
 
@@ -36,8 +37,8 @@ class View:
 
     `size_m` is the side of the printed black square, `angle_noise_deg` how well the readings are known of pan and tilt,
     which turn about `axes` (2, 3) in the apartment; None: about any. `focal_doubt` is the standard deviation of the
-    lens's focal length as a share of it, `aside_deg` that of its axis in any direction. A picture that was `enlarged`
-    has coarser corners by that factor.
+    lens's focal length as a share of it, `aside_deg` that of its axis in any direction. A picture that was `enlarged`,
+    or is less exact for another reason, has coarser corners by that factor.
     """
 
     lens: Lens
@@ -87,7 +88,8 @@ def by_place(views: Sequence[View]) -> list[list[int]]:
 
 
 def gather(places: Sequence[Sequence[View]]) -> Sights:
-    """The views of each place as one sight."""
+    """The views of each place as one sight, of the clearest ones."""
+    places = [_clearest(place) for place in places]
     first = [place[0] for place in places]
     averaged = [average(np.array([view.corners for view in p], float), p[0].enlarged) for p in places]
     looking = [_mean(np.array([view.camera.rotation for view in place])) for place in places]
@@ -100,6 +102,12 @@ def gather(places: Sequence[Sequence[View]]) -> Sights:
         swing=np.array([_swing(v, turned) for v, turned in zip(first, looking, strict=True)]).reshape(-1, 3, 3),
         focal_doubt=np.array([v.focal_doubt for v in first], float),
     )
+
+
+def _clearest(place: Sequence[View]) -> list[View]:
+    """Without those whose corners are known to be much coarser than of others from there."""
+    best = min(view.enlarged for view in place)
+    return [view for view in place if view.enlarged < COARSER * best]
 
 
 def _swing(view: View, rotation: Array) -> Array:

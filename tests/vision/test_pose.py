@@ -368,3 +368,14 @@ def test_zoomed_and_wide_views_are_put_together_by_what_each_knows():
     located = locate([wide, zoomed])
     assert located.frames == 2
     assert off_mm(located, marker) < 6
+
+
+def test_coarse_corners_add_nothing_to_clear_ones_of_a_place_and_alone_they_tell_how_coarse_they_are() -> None:
+    marker = before(HERE, 3, 3.0, (20.0, 40.0))
+    clear = sighted(HERE, marker, np.random.default_rng(1), 0.0, angle=0.05)
+    swollen = clear.corners + 0.002 * (clear.corners - clear.corners.mean(axis=0))
+    coarse = replace(clear, corners=swollen, enlarged=6.0)
+    both, alone = locate([clear, clear, coarse, coarse]), locate([coarse, coarse])
+    assert off_mm(both, marker) < 0.5 < 3.0 < off_mm(alone, marker)
+    assert surprise(alone, marker) < 6.25
+    assert both.covariance[2, 2] < alone.covariance[2, 2] / 10  # along the line of sight

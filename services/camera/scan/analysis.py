@@ -21,6 +21,7 @@ from services.camera.requests import Away
 from services.camera.video import pictures
 from services.runner import Post
 from services.vision.detect import Detection
+from services.vision.exposure import cut_off
 from services.vision.still import Picture, Still, detect_still
 
 ANALYSED = "/camera/analysed"
@@ -54,12 +55,16 @@ class Task:
 
 @dataclass(frozen=True)
 class Analysed:
-    """What was found in a frame of a scan; `size` is (width, height) in pixels, `error` empty if all went well."""
+    """What was found in a frame of a scan; `size` is (width, height) in pixels, `error` empty if all went well.
+
+    `cut_off` tells of each detection whether its light or dark is (`vision/exposure.py`).
+    """
 
     scan: str
     number: int
     size: tuple[int, int] = (0, 0)
     detections: tuple[Detection, ...] = ()
+    cut_off: tuple[bool, ...] = ()
     jpeg: bytes | None = None
     error: str = ""
 
@@ -116,7 +121,8 @@ def _analysed(task: Task, image: Picture | Away, found: Sequence[Detection], *, 
     if isinstance(image, Away):
         return Analysed(task.scan, task.number, error=str(image))
     jpeg = _drawn(task, found) if draw else None
-    return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), tuple(found), jpeg)
+    hard = tuple(cut_off(image, one.corners) for one in found)
+    return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), tuple(found), hard, jpeg)
 
 
 def _drawn(task: Task, found: Sequence[Detection]) -> bytes:
