@@ -130,13 +130,7 @@ class Pace:
         """Takes in one reading."""
         expected, slope = self._slope(told, seen)
         wrong = seen.travel - expected
-        spread = float(slope @ self.cov @ slope) + seen.noise**2
-        if wrong * wrong > OUTLIER**2 * spread:
-            spread = wrong * wrong / OUTLIER**2
-        gain = self.cov @ slope / spread
-        self.mean = self.mean + gain * wrong
-        self.cov = self.cov - np.outer(gain, slope @ self.cov)
-        self.cov = (self.cov + self.cov.T) / 2
+        self.mean, self.cov = taught(self.mean, self.cov, slope, wrong, seen.noise)
         self._keep_within()
 
     def borrow(self, better: Pace) -> None:
@@ -179,6 +173,19 @@ class Pace:
         if seen.acts:
             at = seen.at - float(mean[count + ACT_PART]) * seen.late
         return _travel(mean, count, told, at)[0]
+
+
+def taught(mean: Vector, cov: Vector, slope: Vector, wrong: float, noise: float) -> tuple[Vector, Vector]:
+    """Numbers and their covariance after what changes by `slope` with them was `wrong`; `noise`: standard deviation.
+
+    Kalman's update; what is farther off than is likely counts for less.
+    """
+    spread = float(slope @ cov @ slope) + noise**2
+    if wrong * wrong > OUTLIER**2 * spread:
+        spread = wrong * wrong / OUTLIER**2
+    gain = cov @ slope / spread
+    cov = cov - np.outer(gain, slope @ cov)
+    return mean + gain * wrong, (cov + cov.T) / 2
 
 
 def _travel(mean: Vector, count: int, told: Sequence[Told], at: float) -> tuple[float, float]:

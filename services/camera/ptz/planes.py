@@ -8,11 +8,11 @@ both axes and all levels, each as far as it tells. Pure. What a hop tells: `scal
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import exp
+from math import exp, hypot
 
 import numpy as np
 
-from services.camera.ptz.pace import OUTLIER, Vector
+from services.camera.ptz.pace import Vector, taught
 
 GUESS = (1.0, 0.56)  # pan and tilt at the widest zoom
 LEVELS = 9  # 0 to 8
@@ -75,10 +75,4 @@ class Planes:
 
     def learn(self, slope: Vector, wrong: float, noise: float) -> None:
         """Something that changes so with each number was off by that much; `noise` is one standard deviation."""
-        spread = float(slope @ self.cov @ slope) + noise**2 + (BENT * wrong) ** 2
-        if wrong * wrong > OUTLIER**2 * spread:
-            spread = wrong * wrong / OUTLIER**2
-        gain = self.cov @ slope / spread
-        self.mean = self.mean + gain * wrong
-        self.cov = self.cov - np.outer(gain, slope @ self.cov)
-        self.cov = (self.cov + self.cov.T) / 2
+        self.mean, self.cov = taught(self.mean, self.cov, slope, wrong, hypot(noise, BENT * wrong))

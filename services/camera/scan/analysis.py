@@ -121,8 +121,8 @@ def _analysed(task: Task, image: Picture | Away, found: Sequence[Detection], *, 
     if isinstance(image, Away):
         return Analysed(task.scan, task.number, error=str(image))
     jpeg = _drawn(task, found) if draw else None
-    hard = tuple(cut_off(image, one.corners) for one in found)
-    return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), tuple(found), hard, jpeg)
+    beside = tuple(cut_off(image, one.corners) for one in found)
+    return Analysed(task.scan, task.number, (image.shape[1], image.shape[0]), tuple(found), beside, jpeg)
 
 
 def _drawn(task: Task, found: Sequence[Detection]) -> bytes:

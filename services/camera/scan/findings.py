@@ -55,10 +55,10 @@ class Findings:
         if analysed.error:
             frame.spot.got -= 1
             self.unreadable[frame.place] = analysed.error
-        hard = analysed.cut_off or (False,) * len(analysed.detections)
-        for detection, one in zip(analysed.detections, hard, strict=True):
+        cut_off = analysed.cut_off or (False,) * len(analysed.detections)
+        for detection, one in zip(analysed.detections, cut_off, strict=True):
             if detection.marker in self.targets:
-                sighting = Sighting(detection, frame.place, frame.reading, frame.at, analysed.size, hard=one)
+                sighting = Sighting(detection, frame.place, frame.reading, frame.at, analysed.size, cut_off=one)
                 self.seen.setdefault(detection.marker, []).append(sighting)
                 self.modes.setdefault(detection.marker, []).append(frame.spot.mode)
 

@@ -23,9 +23,7 @@ from services.vision.zoom import WIDEST, Level, Magnification, at_level
 LEAST_TIMES = 1.1  # what a zoom magnifies by at least, of which that is not known
 MOST_SLACK_DEG = 3.0
 HALF_HEIGHT = 9 / 16  # over the focal length, of a lens that is not known: about 90 degrees wide
-HARD = (
-    6.0  # times the noise of corners: high contrast cuts white or black off, and all edges seem 0.03 to 0.09 px beside
-)
+CUT_OFF = 6.0  # times the noise of corners: all edges seem 0.03 to 0.09 px beside there
 WELL_KNOWN = 0.01  # share of the magnification's uncertainty above which no distance is told: 5 cm at 5 m
 
 
@@ -34,7 +32,7 @@ class Sighting:
     """One marker in one frame: `at` when it was taken, `size` of the picture (width, height).
 
     `magnified`: as it was measured against the widest picture from there (`vision/zoom.py`); None: it was not.
-    `hard`: its light or its dark is cut off, so that its edges are less exact (`vision/exposure.py`).
+    `cut_off`: its light or its dark is cut off, so that its edges are less exact (`vision/exposure.py`).
     """
 
     detection: Detection
@@ -43,7 +41,7 @@ class Sighting:
     at: float
     size: tuple[int, int]
     magnified: Magnification | None = None
-    hard: bool = False
+    cut_off: bool = False
 
     @property
     def off_centre(self) -> float:
@@ -182,7 +180,7 @@ def _view(eye: Eye, lens: Lens, mount: Mount, sought: Sought, sighting: Sighting
         angle_noise_deg=eye.angle_noise_deg,
         focal_doubt=magnified.relative,
         aside_deg=degrees(magnified.aside * zoomed.width / zoomed.focal),
-        enlarged=max(1.0, magnified.times) * (HARD if sighting.hard else 1.0),
+        enlarged=max(1.0, magnified.times) * (CUT_OFF if sighting.cut_off else 1.0),
         axes=axes_in_apartment(mount, reading.pan, reading.tilt),
         at=sighting.at,
     )
