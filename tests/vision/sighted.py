@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ceil
 
 import cv2
 import numpy as np
@@ -189,7 +190,7 @@ def sighted(
     pan, tilt = looking(flat, marker, rng, times)
     pose = flat.camera.pose(pan, tilt)
     off = rng.normal(0, noise_deg, 2) if noise_deg else np.zeros(2)
-    reading = Reading(pan + off[0], tilt + off[1], 0.0 if times == 1 else 2.0 * round(2 * (times - 1)))
+    reading = Reading(pan + off[0], tilt + off[1], 0.0 if times == 1 else 2.0 * ceil(2 * (times - 1)))
     still, to_full = _around(flat, marker, pose, times)
     magnified = None if times == 1 else _measured(flat, pose, times, rng)
     size = (flat.camera.lens.width, flat.camera.lens.height)

@@ -48,8 +48,9 @@ class Findings:
         self.taken.append(frame)
         return frame
 
-    def add(self, analysed: Analysed) -> None:
-        """Takes in what was found in one frame."""
+    def add(self, analysed: Analysed) -> bool:
+        """Takes in what was found in one frame; tells whether a target is now seen well enough, and was not before."""
+        before = sum(map(self.found, self.targets))
         self.analysed += 1
         frame = self.taken[analysed.number]
         if analysed.error:
@@ -61,6 +62,7 @@ class Findings:
                 sighting = Sighting(detection, frame.place, frame.reading, frame.at, analysed.size, cut_off=one)
                 self.seen.setdefault(detection.marker, []).append(sighting)
                 self.modes.setdefault(detection.marker, []).append(frame.spot.mode)
+        return sum(map(self.found, self.targets)) > before
 
     @property
     def all_found(self) -> bool:

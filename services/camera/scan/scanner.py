@@ -33,7 +33,7 @@ from services.errors import DeviceError
 from services.memory import give_back
 from services.payloads import OrderState, Place, ScanResult, ScanState
 
-STATE_S = 0.5  # between two states of a scan that runs
+STATE_S = 0.5  # between two states of a scan that runs and finds nothing
 FRESH_S = 2.5  # a reading as old as this still tells where a camera at rest looks
 GATHER_S = 0.1  # between two looks whether frames have come
 RESTORE_S = 5.0  # between two tries to restore the picture
@@ -68,6 +68,7 @@ class Scanner:
         self._moving: Moving | None = None
         self._looking: Analyst | None = None
         self._state_at = 0.0
+        self._news = False  # something was found that is not told yet
 
     @property
     def kind(self) -> Literal["ceiling", "shelf"]:
@@ -112,7 +113,7 @@ class Scanner:
         """What was found in a frame; nobody's when its scan has ended."""
         if self.scan is None or analysed.scan != self.scan.name:
             return
-        self.scan.findings.add(analysed)
+        self._news = self.scan.findings.add(analysed) or self._news
         if analysed.jpeg is not None and analysed.detections:
             frame = self.scan.findings.taken[analysed.number]
             markers = sorted({one.marker for one in analysed.detections})
@@ -130,8 +131,8 @@ class Scanner:
             return
         self.due = now + GATHER_S
         self.scan.gather()
-        if now - self._state_at >= STATE_S:
-            self._state_at = now
+        if self._news or now - self._state_at >= STATE_S:
+            self._state_at, self._news = now, False
             self._say(self.scan.state("running", now))
 
     def ended(self, state: OrderState, error: str | None, now: float) -> None:

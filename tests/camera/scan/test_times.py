@@ -94,6 +94,23 @@ def test_a_target_is_seen_in_a_quarter_of_the_time_that_the_report_s_scan_needs(
     assert mean(seen.values()) <= bounds.SIGHTING_SHARE * mean(report)
 
 
+def test_what_is_found_is_told_at_once(trial: VirtualScan) -> None:
+    markers = {number: (place.pan, place.tilt) for number, place in enumerate(trial.places.values(), 1)}
+    trial.sees(markers)
+    found: dict[int, float] = {}
+    told: dict[int, float] = {}
+
+    def each(scan: Scan) -> None:
+        for marker in filter(scan.findings.found, markers):
+            found.setdefault(marker, trial.flat.now)
+        for marker in trial.states()[-1].found:
+            told.setdefault(marker, trial.flat.now)
+
+    trial.run('{"targets": [1, 2, 3, 4, 5, 6, 7, 8, 9]}', each)
+    assert len(found) == len(told) == len(markers)
+    assert max(told[marker] - found[marker] for marker in markers) < 0.05
+
+
 def test_the_picture_is_as_it_was_after_a_scan_in_both_modes(trial: VirtualScan) -> None:
     trial.sees({})
     tables = trial.inside.device.tables
