@@ -44,10 +44,14 @@ def pids(flat: Simulated, without: str = "") -> dict[str, int]:
     return {child.name: child.process.pid for child in children if child.process and child.name != without}
 
 
-def settled(flat: Simulated, name: str) -> int:
-    """The pid of a service that runs and is ready."""
+def settled(flat: Simulated, name: str, killed: int = 0) -> int:
+    """The pid of a service that runs and is ready; it is another one than that of a process that was killed."""
     child = flat.supervisor.children[name]
-    peers.wait_until(lambda: child.process is not None and child.ready is not None, f"{name} to be ready")
+
+    def runs() -> bool:
+        return child.process is not None and child.process.pid != killed and child.ready is not None
+
+    peers.wait_until(runs, f"{name} to be ready")
     assert child.process is not None
     return child.process.pid
 
@@ -66,7 +70,7 @@ def kill(flat: Simulated, name: str) -> float:
         noticed = {message.topic for message in bus.seen if not message.retain}
     assert noticed == {f"service/{name}/status"}
     assert pids(flat, name) == others
-    settled(flat, name)
+    settled(flat, name, killed=pid)
     return seconds
 
 
@@ -88,7 +92,7 @@ def kill_camera(flat: Simulated) -> float:
         seconds = time.monotonic() - killed
         bus.forget()
     assert pids(flat, "simulated-camera") == others
-    settled(flat, "simulated-camera")
+    settled(flat, "simulated-camera", killed=pid)
     return seconds
 
 
