@@ -2,7 +2,8 @@
 
 A hop may begin while the last one, or a start at full speed, still turns. Where it leads depends on where the camera
 was just then: that is known when it was answered, not before, so the last hop of a long way leaves some degrees to
-one more that begins at rest. A late hop pushes nothing against a stop. Not here: how an axis glides (`glide.py`), how
+one more that begins at rest. A late hop pushes nothing against a stop. Zoom turns by hops only, so where it takes
+long they begin sooner. Not here: how an axis glides (`glide.py`), how
 large the scale is (`planes.py`), what hops teach (`scale.py`).
 """
 
@@ -13,7 +14,7 @@ from typing import cast
 
 from services.camera.plan import Plan, wait
 from services.camera.ptz import scale
-from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.course import PAN, TILT, ZOOM, ZOOM_SLOWS_S
 from services.camera.ptz.driving import at_rest
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.helm import Helm, levels_of, sign
@@ -31,7 +32,7 @@ SHARP_DEG = 0.05  # what the reckoning leaves open, at least
 TRY_DEG = 12.0  # a first hop, whose scale is a guess
 BULK = 1.5  # answers: a start at full speed that is shorter is not worth it
 LATE_LOOK = 2.0  # answers: a look as late as that does not delay what it is for
-FEW = 4  # commands, for a hop, another from rest, and looks
+FEW = 2  # commands, for a hop from rest and a look
 
 
 class Hopping:
@@ -91,6 +92,7 @@ class Hopping:
         lead = max(ways, key=lambda axis: abs(ways[axis]) / rates[axis])
         safe = abs(ways[lead]) + self._room(lead, ways[lead]) - rates[lead] * timing.tail - self._brakes(lead)
         held = min(abs(ways[lead]) - self._before(lead), safe) / rates[lead]
+        held = min(held, self._whole(lead, ways[lead]) - self._zooming())
         if held < BULK * timing.usual:
             return now
         turning = {axis: self._along(axis, way, held) * sign(way) for axis, way in ways.items() if helm.skill.diagonals}
@@ -109,6 +111,21 @@ class Hopping:
             now = reply.received
             helm.course.read(reply, cast(Reading, reply.result))
         return (yield from wait(max(now, helm.course.end_for(lead, end, now) - timing.usual)))
+
+    def _whole(self, axis: int, way: float) -> float:
+        """How long an axis takes from rest to rest."""
+        pace = self.helm.skill.paces[axis]
+        return abs(way) / pace.rate(pace.speeds[-1]) + pace.change(pace.speeds[-1])
+
+    def _zooming(self) -> float:
+        """How long zoom takes, which a start at full speed would put off."""
+        if not self._takes_zoom():
+            return 0.0
+        pace = self.helm.skill.drives[ZOOM]
+        return abs(self.helm.aim[ZOOM] - self.helm.course.origin[ZOOM]) / pace.rate(1)
+
+    def _takes_zoom(self) -> bool:
+        return self.zooms and self.helm.skill.honours.get(scale.ZOOMS) != "no"
 
     def _before(self, axis: int) -> float:
         """How far before its goal a hop should begin that leads there: within its reach, and before it would brake."""
@@ -148,8 +165,8 @@ class Hopping:
             way = min(reach, max(-reach, helm.aim[axis] - there[axis]))
             parts.append(helm.skill.senses[axis].sign * tan(radians(way)) / planes[axis])
         right, down = (min(1.0, max(-1.0, part)) for part in parts)
-        zooms = helm.skill.honours.get(scale.ZOOMS) != "no" and most > TRY_DEG
-        request = MoveOver(right, down, self._zoom_aim() - there[ZOOM] if zooms and self.zooms else 0.0)
+        zooms = self._takes_zoom() and most > TRY_DEG
+        request = MoveOver(right, down, self._zoom_aim() - there[ZOOM] if zooms else 0.0)
         self._glide(request, (yield from helm.send(request)))
         return self.glides[0].answered
 
@@ -175,6 +192,7 @@ class Hopping:
             low, high = helm.limits.ranges[axis]
             pace = helm.skill.drives[ZOOM] if axis == ZOOM else helm.skill.paces[axis]
             top, slow = pace.rate(pace.speeds[-1]), 2 * pace.other(HALF_CHANGE)
+            slow = ZOOM_SLOWS_S / top if axis == ZOOM else slow
             goal = min(high, max(low, place + way))
             self.glides.append(Glide(acted, place, speed, goal, top, 1 / slow, reply.received))
         begun, speeds = ((pan, tilt, zoom) for pan, tilt, zoom in zip(*poses, strict=True))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from statistics import median
 
 import pytest
 
@@ -11,8 +12,9 @@ from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
 from services.camera.requests import MoveOver
+from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.track import Moment, Rail, go
-from tests.camera.goals import random_goals
+from tests.camera.goals import Rig, random_goals
 from tests.camera.motors import Motors, drive
 
 LIMITS = Limits()
@@ -47,3 +49,14 @@ def test_a_relative_form_is_found_and_its_scale_learnt_whatever_that_is(mirror: 
     assert skill.honours["Position"] == "yes"
     assert all(hops[-6:])
     assert not motors.pushed
+
+
+def test_zoom_turns_with_pan_and_tilt_from_the_beginning_where_it_takes_as_long() -> None:
+    rig = Rig(PROFILES["ip2m-841b-strict"], 3)
+    for goal in random_goals(20, 3):
+        rig.go(goal)
+    ratios = []
+    for pan, tilt, zoom in [(60.0, 20.0, 8.0), (110.0, 70.0, 0.0), (70.0, 15.0, 8.0), (30.0, 60.0, 0.0)] * 3:
+        rig.go((pan + 50.0, 90.0 - tilt, 8.0 - zoom))
+        ratios.append(rig.go((pan, tilt, zoom)).ratio)
+    assert median(ratios) < 1.5, ratios
