@@ -3,8 +3,8 @@
 A hop may begin while the last one, or a start at full speed, still turns. Where it leads depends on where the camera
 was just then: that is known when it was answered, not before, so the last hop of a long way leaves some degrees to
 one more that begins at rest. A late hop pushes nothing against a stop. Zoom turns by hops only, so where it takes
-long they begin sooner. Not here: how an axis glides (`glide.py`), how
-large the scale is (`planes.py`), what hops teach (`scale.py`).
+long they begin sooner. Not here: how an axis glides (`glide.py`), how large the scale is (`planes.py`), what hops teach
+(`scale.py`).
 """
 
 from __future__ import annotations
@@ -52,9 +52,12 @@ class Hopping:
         able = honoured in ("unknown", "yes") and all(one.sure for one in skill.senses)
         if not able or self.turns >= TURNS or self.helm.left < FEW:
             return None
+        here = self.helm.course.origin
+        self.zooms = abs(self.helm.aim[ZOOM] - here[ZOOM]) > self.helm.zoom_near / 2
+        if not self.helm.beside(here) and not self._takes_zoom():
+            return None  # zoom alone is missing, and hops leave it
         self.turns += 1
         self.glides, self.hops = [], []
-        self.zooms = abs(self.helm.aim[ZOOM] - self.helm.course.origin[ZOOM]) > self.helm.zoom_near / 2
         try:
             now = yield from (self._chain(now) if honoured == "yes" else self._send(now, TRY_DEG))
         except Refused:

@@ -10,6 +10,7 @@ import pytest
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
+from services.camera.ptz.scale import ZOOMS
 from services.camera.ptz.skill import Skill
 from services.camera.requests import MoveOver
 from services.simulators.camera.firmwares import PROFILES
@@ -60,3 +61,17 @@ def test_zoom_turns_with_pan_and_tilt_from_the_beginning_where_it_takes_as_long(
         rig.go((pan + 50.0, 90.0 - tilt, 8.0 - zoom))
         ratios.append(rig.go((pan, tilt, zoom)).ratio)
     assert median(ratios) < 1.5, ratios
+
+
+def test_where_hops_leave_zoom_as_it_is_none_is_made_for_zoom_alone() -> None:
+    motors, skill, now = Motors(relative=True, acceleration=90.0), Skill(), 1000.0
+    motors.now = now
+    skill.honours[ZOOMS] = "no"
+    for pan, tilt, zoom in [*random_goals(6, 3), *[(100.0, 40.0, zoom) for zoom in (0.0, 4.0, 8.0, 2.0)]]:
+        motors.sent.clear()
+        run, took = drive(goto(LIMITS.goal(pan, tilt, zoom), LIMITS, skill, now + 60.0), motors, now=now)
+        now += took
+        assert run.error is None
+    assert skill.honours["Position"] == "yes"
+    assert motors.sent
+    assert not any(isinstance(request, MoveOver) for request in motors.sent)
