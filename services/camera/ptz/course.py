@@ -11,9 +11,10 @@ from services.camera.ptz.skill import Skill
 from services.camera.requests import Reading, Reply
 
 PAN, TILT, ZOOM = range(3)
+END = 0.15  # degrees or levels: as near as that to an end of its range, an axis may have been stopped by it
 READ_DEG = 0.08  # the resolution, and a little dither
 ZOOM_SLOWS_S = 0.1  # coarse readings do not teach how long zoom takes to stop
-TIME_S = 0.02  # what is left of the timing of a command or a reading when all that is learnt is taken off
+TIME_S = 0.01  # what is left of the timing of a command or a reading when all that is learnt is taken off
 
 
 class Course:
@@ -93,7 +94,9 @@ class Course:
         changes = [abs(one.level) for one in told]
         timing = TIME_S * max((pace.rate(level) for level in changes if level), default=0.0)
         seen = Seen(reply.sent, late, value - self.origin[axis], (noise**2 + (TIME_S * speed) ** 2 + timing**2) ** 0.5)
-        if low + 0.15 < value < high - 0.15:
+        inside = low + END < value < high - END
+        farther = abs(seen.travel) > abs(pace.expected(told, seen)[0])
+        if inside or farther:  # at an end it may have been stopped, having come at least so far
             pace.learn(told, seen)
         if axis != ZOOM or not speed:
             model = self.origin[axis] + pace.travel(told, pace.seen_at(reply.sent, late))

@@ -114,7 +114,7 @@ def _judge_to(skill: Skill, here: Pose, drive: Drive, request: MoveTo, there: Po
     off = tuple(there[axis] - drive.to[axis] for axis in (PAN, TILT))
     proven, asked = skill.honours.get(request.form) == "yes", abs(drive.to[TILT] - here[TILT])
     stayed = abs(there[TILT] - here[TILT]) < LEAST_DEG / 2
-    if max(map(abs, off)) > BESIDE_DEG or (not proven and asked > LEAST_DEG and stayed):
+    if max(map(abs, off)) > BESIDE_DEG or (asked > LEAST_DEG and stayed):
         tilt_ignored = abs(off[PAN]) <= BESIDE_DEG and abs(there[TILT] - here[TILT]) < LEAST_DEG
         skill.honours[request.form] = "pan" if tilt_ignored else "no"
     elif proven or asked > LEAST_DEG:

@@ -69,7 +69,7 @@ class Helm:
         """Sends, counts, and takes in how long it took."""
         self.commands += 1
         reply = yield from ask(request)
-        self.skill.timing.learn(reply.received - reply.sent)
+        self.skill.timed(reply.received - reply.sent)
         if isinstance(reply.result, Reading) and reply.result.moving:
             self.skill.says_moving = True
         return reply
@@ -89,7 +89,7 @@ class Helm:
         """Ends all motion; returns when that was answered."""
         self.commands += 1
         reply = yield from until_confirmed(now)
-        self.skill.timing.learn(reply.received - reply.sent)
+        self.skill.timed(reply.received - reply.sent)
         self.course.tell(reply, (0, 0, 0))
         self.zoom_ends = None
         return reply.received

@@ -32,6 +32,7 @@ COMMON, NEIGHBOURS = 0.5, 4.0  # what all speeds have in common; and how many st
 SLOWEST = 0.05
 FLOOR = 0.2  # of the guess: what other speeds teach of one makes it no slower
 DRIFT = 0.002  # of each rate, per motion: motors age
+DOUBT_AGAIN = 0.01  # of the first guess's covariance, when what is known was wrong
 OUTLIER = 3.0  # standard deviations; beyond, a reading counts for less
 
 
@@ -127,11 +128,23 @@ class Pace:
         return value, float(np.sqrt(slope @ self.cov @ slope))
 
     def learn(self, told: Sequence[Told], seen: Seen) -> None:
-        """Takes in one reading."""
+        """Takes in one reading. It may be of another time than is thought, but not where the axis rests: if it rests
+        far from where it should, then what was thought to be known well is not.
+        """
         expected, slope = self._slope(told, seen)
         wrong = seen.travel - expected
+        likely = float(slope @ self.cov @ slope) + seen.noise**2
+        if wrong * wrong > OUTLIER**2 * likely and not self.velocity(told, self.seen_at(seen.at, seen.late)):
+            self.cov = self.cov + DOUBT_AGAIN * _prior(self.guess)[1]
         self.mean, self.cov = taught(self.mean, self.cov, slope, wrong, seen.noise)
         self._keep_within()
+
+    def measure_late_from(self, later: float) -> None:
+        """What is usual for an answer is so many seconds more now; readings and commands mean the same as before."""
+        count, change = len(self.guess), np.eye(len(self.mean))
+        change[count + READ_LATE, [count + READ_PART, count + ACT_PART]] = later
+        self.mean = change @ self.mean
+        self.cov = change @ self.cov @ change.T
 
     def borrow(self, better: Pace) -> None:
         """Takes over what an axis with finer readings knows of the timing of answers."""

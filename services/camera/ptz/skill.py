@@ -90,6 +90,13 @@ class Skill:
     presets: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # readings where each was seen to be
     planes: Planes = field(default_factory=Planes)  # of the relative form
 
+    def timed(self, seconds: float) -> None:
+        """An answer took so long; what is usual may change with it, and what was learnt against that stays as true."""
+        before = self.timing.usual
+        self.timing.learn(seconds)
+        for pace in (*self.paces, *self.drives):
+            pace.measure_late_from(self.timing.usual - before)
+
     def forget_senses(self, *, flip: bool, mirror: bool) -> None:
         """The picture's options changed, and these swap the motors: guess, and look at the next motion."""
         self.picture = (flip, mirror)

@@ -53,14 +53,15 @@ def test_a_relative_form_is_found_and_its_scale_learnt_whatever_that_is(mirror: 
 
 
 def test_zoom_turns_with_pan_and_tilt_from_the_beginning_where_it_takes_as_long() -> None:
-    rig = Rig(PROFILES["ip2m-841b-strict"], 3)
-    for goal in random_goals(20, 3):
-        rig.go(goal)
     ratios = []
-    for pan, tilt, zoom in [(60.0, 20.0, 8.0), (110.0, 70.0, 0.0), (70.0, 15.0, 8.0), (30.0, 60.0, 0.0)] * 3:
-        rig.go((pan + 50.0, 90.0 - tilt, 8.0 - zoom))
-        ratios.append(rig.go((pan, tilt, zoom)).ratio)
-    assert median(ratios) < 1.5, ratios
+    for seed in range(4):
+        rig = Rig(PROFILES["ip2m-841b-strict"], seed)
+        for goal in random_goals(20, seed):
+            rig.go(goal)
+        for pan, tilt, zoom in [(60.0, 20.0, 8.0), (110.0, 70.0, 0.0), (70.0, 15.0, 8.0), (30.0, 60.0, 0.0)] * 3:
+            rig.go((pan + 50.0, 90.0 - tilt, 8.0 - zoom))
+            ratios.append(rig.go((pan, tilt, zoom)).ratio)
+    assert median(ratios) < 1.6, ratios  # 1.8 where zoom waits for pan and tilt
 
 
 def test_where_hops_leave_zoom_as_it_is_none_is_made_for_zoom_alone() -> None:

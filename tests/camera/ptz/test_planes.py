@@ -14,6 +14,7 @@ from services.camera.ptz.planes import LEVELS, Planes
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Identity
 from services.simulators.camera.firmwares import PROFILES
+from services.simulators.camera.latency import TAIL
 from services.simulators.camera.motors import magnification
 from tests.camera.goals import Rig, random_goals
 
@@ -81,7 +82,8 @@ def test_what_was_learnt_of_it_is_kept(tmp_path: Path) -> None:
 def test_a_hop_that_is_late_near_the_dead_arc_pushes_nothing_against_it(
     late: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rig = Rig(PROFILES["ip2m-841b-strict"], 8)
+    profile = PROFILES["ip2m-841b-strict"]
+    rig, latest = Rig(profile, 8), TAIL[1] * (profile.latency_s + profile.latency_spread_s)
     for goal in random_goals(8, 8):
         rig.go(goal)
     usual, asked = rig.device.latency.control, 0
@@ -89,7 +91,7 @@ def test_a_hop_that_is_late_near_the_dead_arc_pushes_nothing_against_it(
     def control(now: float) -> float:
         nonlocal asked
         asked += 1
-        return 3 * usual(now) if asked == late else usual(now)
+        return latest if asked == late else usual(now)
 
     for pan in range(156, 179, 2):
         assert not rig.go((20.0, 60.0, 6.0)).error

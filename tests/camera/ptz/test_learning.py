@@ -1,0 +1,90 @@
+"""What readings teach of the motors, and what they must not teach."""
+
+from __future__ import annotations
+
+import random
+from copy import deepcopy
+
+import pytest
+
+from services.camera.ptz.course import ZOOM, Course
+from services.camera.ptz.drive import Drive, judge
+from services.camera.ptz.goal import Limits
+from services.camera.ptz.pace import PAN_RATES, Pace, Seen, Told
+from services.camera.ptz.skill import Skill
+from services.camera.requests import Direction, MoveTo, Reading, Reply, Start, Status
+
+LIMITS = Limits()
+
+
+def some_readings(rng: random.Random, usual: float) -> list[tuple[list[Told], Seen]]:
+    """Turns and readings on the way; how late each answer came is told from what is usual."""
+    found = []
+    for _ in range(20):
+        answered = rng.uniform(0.2, 0.5)
+        told = [Told(1000.0, answered - usual, rng.choice((3, 6, 8)))]
+        asked = 1000.0 + rng.uniform(0.2, 2.0)
+        found.append((told, Seen(asked, rng.uniform(0.2, 0.5) - usual, rng.uniform(1.0, 60.0), 0.1)))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_was_learnt_stays_as_true_when_another_delay_of_answers_is_the_usual_one(seed: int) -> None:
+    pace, rng = Pace(PAN_RATES), random.Random(seed)
+    for told, seen in some_readings(rng, 0.3):
+        pace.learn(told, seen)
+    moved = deepcopy(pace)
+    moved.measure_late_from(0.07)
+    before, after = some_readings(random.Random(9), 0.3), some_readings(random.Random(9), 0.37)
+    for (told, seen), (told_then, seen_then) in zip(before, after, strict=True):
+        assert moved.expected(told_then, seen_then) == pytest.approx(pace.expected(told, seen), rel=1e-3, abs=1e-3)
+
+
+def zoom_rate_after(rate: float, begun: float, turn: Direction, reading: float) -> float:
+    """What the rate of zoom, so far thought to be this, is thought to be after a turn of 1.5 s led there."""
+    skill = Skill()
+    skill.paces[ZOOM].mean[0] = rate
+    course = Course(LIMITS, skill, (0.0, 20.0, begun))
+    course.tell(Reply(Start(turn, 1), 1, None, None, 999.7, 1000.0), turn.value)
+    seen = Reading(0.0, 20.0, reading)
+    course.read(Reply(Status(), 2, seen, None, 1001.5, 1001.8), seen)
+    return skill.paces[ZOOM].rate(1)
+
+
+@pytest.mark.parametrize(
+    ("rate", "begun", "turn", "reading", "becomes"),
+    [
+        (1.0, 8.0, Direction.ZOOM_OUT, 4.0, "more"),
+        (9.0, 8.0, Direction.ZOOM_OUT, 4.0, "less"),
+        (1.0, 8.0, Direction.ZOOM_OUT, 0.0, "more"),
+        (9.0, 8.0, Direction.ZOOM_OUT, 0.0, "the same"),
+        (1.0, 0.0, Direction.ZOOM_IN, 0.0, "the same"),  # told in steps, the last step may not be over
+    ],
+)
+def test_a_reading_at_an_end_of_the_range_may_show_that_it_went_faster_never_that_it_went_slower(
+    rate: float, begun: float, turn: Direction, reading: float, becomes: str
+) -> None:
+    after = zoom_rate_after(rate, begun, turn, reading)
+    assert becomes == ("more" if after > rate else "less" if after < rate else "the same")
+
+
+def test_firmware_that_seemed_to_honour_tilt_is_found_out_when_it_stays() -> None:
+    skill = Skill(honours={"PositionABS": "yes"})
+    judge(skill, (10.0, 20.0, 0.0), Drive(MoveTo(40.0, 24.0, 0.0, "PositionABS"), (40.0, 24.0, 0.0)), (40.0, 20.0, 0.0))
+    assert skill.honours["PositionABS"] == "pan"
+
+
+@pytest.mark.parametrize("faster", [0.6, 1.6])
+def test_what_is_wrong_although_it_was_known_well_is_learnt_anew(faster: float) -> None:
+    """Turns rest far from where they should; if that were not believed, the next ones would too."""
+    truth, pace = Pace(PAN_RATES), Pace(PAN_RATES)
+    pace.mean[: len(PAN_RATES)] *= faster
+    pace.cov *= 1e-4
+    missed = []
+    for turn in range(6):
+        told = [Told(1000.0, 0.0, 8), Told(1001.5 + 0.1 * turn, 0.0, 0)]
+        rests = truth.travel(told, 1010.0)
+        missed.append(abs(pace.travel(told, 1010.0) - rests))
+        pace.learn(told, Seen(1010.0, 0.0, rests, 0.3))
+    assert missed[0] > 5.0
+    assert missed[-1] < 0.5
