@@ -119,7 +119,7 @@ def connected(
         bus.subscribe(filters)
         end = time.monotonic() + timeout_s
         waiting: list[Message] = []
-        while not bus.connected:
+        while not bus.listens:
             if time.monotonic() > end:
                 raise TimeoutError(f"no broker answers at {settings.host}:{settings.port}")
             waiting += bus.receive(0.05)

@@ -93,7 +93,7 @@ def tls_context(tls: Tls) -> ssl.SSLContext:
 def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
     """Runs services until SIGTERM or SIGINT, each in a thread of its own; a bug in one ends all and comes out as it is.
 
-    `ready` is told once, when the last of them has its connection.
+    `ready` is told once, when the last of them hears what it subscribed to.
     """
     if os.environ.get(SUPERVISED):
         _end_with_parent()
@@ -187,7 +187,7 @@ def _turns(runner: Runner, stopping: threading.Event, clock: Clock, ready: Calla
             log.warning("%s ends, to be started again: the clock was set back by %.0f s", runner.name, back)
             stopping.set()
         runner.turn(min(LONGEST_WAIT_S, max(0.0, runner.due - time.time())))
-        if not told and runner.bus.connected:
+        if not told and runner.bus.listens:
             ready()
             told = True
 

@@ -34,7 +34,13 @@ CORE = (
 )
 FILES_OF_OURS = ("services.document", "services.secret_store")  # reading YAML, finding secrets
 SHELL = ("services.config", "services.registry", "services.runner", "services.aside", "services.process")
-BUSES = ("services.bus.mqtt", "services.bus.memory", "services.bus.connection", "services.bus.outbox")
+BUSES = (
+    "services.bus.mqtt",
+    "services.bus.memory",
+    "services.bus.connection",
+    "services.bus.inbox",
+    "services.bus.outbox",
+)
 THE_FLAT = (
     "services.vision",
     "services.apartment.floor",
@@ -65,9 +71,10 @@ LAYERS: dict[str, tuple[str, ...]] = {
         "services.payloads",
         "services.topic",
     ),
-    "services.bus.mqtt": (*CORE, "services.bus.connection", "services.bus.outbox"),
+    "services.bus.mqtt": (*CORE, "services.bus.connection", "services.bus.inbox", "services.bus.outbox"),
     "services.bus.memory": (*CORE, "services.bus.outbox"),
     "services.bus.connection": CORE,
+    "services.bus.inbox": CORE,
     "services.bus.outbox": CORE,
     "services.ros": ("services.errors",),
     "services.vision": ("services.errors",),

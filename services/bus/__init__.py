@@ -63,6 +63,11 @@ class Bus(Protocol):
         ...
 
     @property
+    def listens(self) -> bool:
+        """Whether it is connected, and hears from now on what it subscribed to."""
+        ...
+
+    @property
     def dropped(self) -> int:
         """How many messages were not sent for want of a connection, or not taken for want of time."""
         ...

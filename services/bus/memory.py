@@ -71,6 +71,11 @@ class MemoryBus:
             self.connect()
 
     @property
+    def listens(self) -> bool:
+        """See `Bus`: what is subscribed to is heard at once."""
+        return self.connected
+
+    @property
     def dropped(self) -> int:
         """How many messages could not be kept while there was no connection."""
         return self._outbox.dropped

@@ -9,7 +9,6 @@ every method here; the keeper, which connects again and again. The keeper also r
 from __future__ import annotations
 
 import logging
-import queue
 import random
 import threading
 import time
@@ -23,14 +22,12 @@ from paho.mqtt.reasoncodes import ReasonCode
 
 from services.bus import LOST_TOPIC, SESSION_TOPIC, WAKE_TOPIC, Delivery, Message, connection, topic_matches
 from services.bus.connection import CONNECT_TIMEOUT_S, WINDOW, Address
+from services.bus.inbox import Inbox
 from services.bus.network import Client, Network
 from services.bus.outbox import Outbox
 
 log = logging.getLogger(__name__)
 
-FLOOD = 4, 4000.0  # messages at once, and a second, from which one at a time costs a change of threads for each
-GATHER_S = 0.002  # in a flood the next ones are left to gather so long
-INBOX = 20_000  # waiting messages, beyond which those of QoS 0 are dropped
 RETRY_S = (0.1, 1.0)  # between attempts to connect: first, longest; a restarted broker is met again within 2 s
 FAREWELL_S = 2.0
 LOOK_S = 0.01  # between two looks whether the last words are said
@@ -54,7 +51,7 @@ class MqttBus:
         self._will = will
         self._clock = clock
         self._filters: tuple[str, ...] = ()
-        self._inbox: queue.SimpleQueue[Message] = queue.SimpleQueue()
+        self._inbox = Inbox(gathers=not address.inline)
         self._outbox = Outbox(self._send, birth)
         self._in_flight: dict[int, Message] = {}  # events that the broker has not acknowledged yet
         self._acknowledged: deque[int] = deque()
@@ -68,9 +65,6 @@ class MqttBus:
         self._closing = threading.Event()
         self._lost = threading.Event()
         self._told = ""
-        self._overrun = 0
-        self._busy = False
-        self._taken = time.monotonic()
         self._keeper = threading.Thread(target=self._keep_connected, name="bus", daemon=True)
         self._keeper.start()
 
@@ -80,17 +74,23 @@ class MqttBus:
         return self._up != 0 and self._up == self._greeted
 
     @property
+    def listens(self) -> bool:
+        """See `Bus`."""
+        client = self._client
+        return self.connected and client is not None and client.listens
+
+    @property
     def dropped(self) -> int:
         """How many messages were not sent for want of a connection, or not taken for want of time."""
-        return self._outbox.dropped + self._overrun
+        return self._outbox.dropped + self._inbox.dropped
 
     # -- what the service calls
 
     def subscribe(self, filters: Sequence[str]) -> None:
         """See `Bus`."""
         self._filters = (*self._filters, *filters)
-        if self._up and self._client is not None:
-            self._client.ask_for(filters)
+        if (client := self._client) is not None:
+            client.ask_for(filters)
             self._network.wake()
             self._tell_of_session()
 
@@ -108,23 +108,13 @@ class MqttBus:
         """See `Bus`."""
         self._keep_up()
         if self.address.inline:
-            self._go_on(timeout, lambda: most == 0 or self._inbox.empty())
+            self._go_on(timeout, lambda: most == 0 or self._inbox.empty)
             timeout = 0.0
-        elif self._busy and most:
-            time.sleep(GATHER_S)
         if not most:
             self._closing.wait(timeout)
             return []
-        get, taken = self._inbox.get_nowait, []
-        try:
-            taken.append(self._inbox.get(timeout=timeout) if timeout != 0.0 else get())
-            while len(taken) < most:
-                taken.append(get())
-        except queue.Empty:
-            pass
+        taken = self._inbox.take(timeout, most)
         self._keep_up()
-        before, self._taken = self._taken, time.monotonic()
-        self._busy = len(taken) >= max(FLOOD[0], FLOOD[1] * (self._taken - before))
         return self._to_handle(taken)
 
     def ack(self, messages: Iterable[Message]) -> None:
@@ -254,6 +244,7 @@ class MqttBus:
         client.on_disconnect = self._on_disconnect  # type: ignore[assignment]
         client.on_came = self._on_came
         client.on_acknowledged = self._acknowledged.append
+        client.on_granted = lambda: self._inbox.put(WAKE)
         return client
 
     def _tell(self, text: str) -> None:
@@ -272,11 +263,11 @@ class MqttBus:
         if self._told:
             log.info("connected to %s:%s", self.address.host, self.address.port)
             self._told = ""
-        self._client = client
+        self._client = client  # before the filters are read: who subscribes meanwhile asks by himself
         self._acknowledged.clear()
         self.connections = client.number = self.connections + 1
-        self._up = self.connections  # before the filters are read: what is asked for meanwhile sees that it is up
         client.ask_for(self._filters)
+        self._up = self.connections  # after they are asked for: what is said is said by who listens
         self._sessions.append(bool(flags.session_present))
         self._tell_of_session()
         self._inbox.put(WAKE)
@@ -294,7 +285,4 @@ class MqttBus:
             if message.qos and message.token is not None:
                 self._to_acknowledge.append(message.token)
             return  # amqtt 0.12 hands out retained messages that nobody asked for, and waits for their acknowledgement
-        if message.qos == 0 and self._inbox.qsize() > INBOX:  # QoS 1 is held back by the window instead
-            self._overrun += 1
-            return
         self._inbox.put(message)

@@ -12,6 +12,7 @@ import socket
 import ssl
 import struct
 import time
+from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import Any
@@ -33,29 +34,37 @@ PUBACK_HEAD = MessageType.PUBACK << 8 | 2  # its first two bytes: the type, and 
 class Client(paho.Client):
     """paho's client with a faster way in and out: most of its time goes into `on_message` and `on_publish`.
 
-    `on_came` is given each message, `on_acknowledged` the packet ids of ours that the broker has. `number` is told with
-    each message: which connection it came by.
+    `on_came` is given each message, `on_acknowledged` the packet ids of ours that the broker has, and `on_granted` is
+    called when it has taken in a subscription. `number` is told with each message: which connection it came by.
     """
 
     on_came: Callable[[Message], None]
     on_acknowledged: Callable[[int], None]
+    on_granted: Callable[[], None]
     clock: Callable[[], float]
     number = 0
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._came, self._at = b"", 0
+        self._asked: deque[None] = deque()  # one for each subscription that the broker has not granted yet
         self.on_socket_register_write = _nobody  # so that paho leaves the writing to `write`
 
     def ask_for(self, filters: Iterable[str]) -> None:
         """Subscribes, with QoS 1; not to the topics that are only within this process."""
         if wanted := [(one, 1) for one in filters if not one.startswith("/")]:
+            self._asked.append(None)
             self.subscribe(wanted)
+
+    @property
+    def listens(self) -> bool:
+        """Whether everything that was asked for is granted, or denied."""
+        return not self._asked
 
     def forget(self) -> None:
         """Whom it tells. Its socket is closed when nobody holds it; in a circle that would be left to chance."""
         self.on_connect = self.on_disconnect = None
-        self.on_came = self.on_acknowledged = _nobody
+        self.on_came = self.on_acknowledged = self.on_granted = _nobody
 
     def ack_all(self, packets: Iterable[int]) -> None:
         """Acknowledges messages with QoS 1, by their packet ids, in one piece."""
@@ -127,6 +136,12 @@ class Client(paho.Client):
         token = Delivery(self.number, packet, bool(head & 8))
         payload, retain = bytes(data[end:]), bool(head & 1)
         return Message(topic, payload, retain, qos, self.clock(), None, reply_to, correlation, token=token)
+
+    def _handle_suback(self) -> None:
+        super()._handle_suback()
+        with suppress(IndexError):  # a broker grants what nobody asked for
+            self._asked.pop()
+        self.on_granted()
 
     def _handle_pubackcomp(self, cmd: Any) -> MQTTErrorCode:
         packet = int.from_bytes(self._in_packet["packet"][:2], "big")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from services import peers
 from services.bus import LOST_TOPIC, SESSION_TOPIC, Message, topic_matches
 from services.bus.memory import Hub, MemoryBus
 from services.bus.mqtt import Address, MqttBus
+from services.bus.network import Client
 from services.peers import embedded, free_port, mosquitto
 
 WITHIN_S = 5.0
@@ -181,6 +182,26 @@ def test_whenever_it_subscribes_it_hears_before_during_and_after_connecting(kit:
         listen(late)
         speaker.publish(Message("reply/late", str(pause).encode()))
         assert take(late, 1, speaker)[-1].payload == str(pause).encode()
+
+
+def test_who_listens_hears_the_very_next_word_however_long_the_broker_takes_to_grant_that(
+    kit: Kit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asks, speaker = Client.ask_for, kit.client("speaker")
+    until(lambda: speaker.listens, speaker)
+
+    def ask_late(client: Client, filters: Iterable[str]) -> None:
+        threading.Event().wait(0.1)
+        asks(client, filters)
+
+    monkeypatch.setattr(Client, "ask_for", ask_late)
+    for turn in range(5):
+        late = kit.make(f"late{turn}")
+        kit.buses.append(late)
+        late.subscribe(["reply/late"])
+        until(lambda bus=late: bus.listens, late)
+        speaker.publish(Message("reply/late", str(turn).encode()))
+        assert [message.payload for message in take(late, 1, speaker)] == [str(turn).encode()]
 
 
 def test_order_is_kept(kit: Kit) -> None:

@@ -17,7 +17,7 @@ from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
-from services.bus import Delivery, Message, mqtt
+from services.bus import Delivery, Message, inbox
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.bus.network import Client
@@ -135,7 +135,7 @@ def test_only_a_flood_is_left_to_gather(monkeypatch: pytest.MonkeyPatch, every_s
     """At 1,000 a second a turn of 5 ms takes five at once, and whoever waits for those is not made to wait longer."""
     now, slept = [0.0], list[float]()
     monkeypatch.setattr(
-        mqtt, "time", SimpleNamespace(time=time.time, monotonic=lambda: now[0], sleep=slept.append), raising=True
+        inbox, "time", SimpleNamespace(time=time.time, monotonic=lambda: now[0], sleep=slept.append), raising=True
     )
     bus = MqttBus(Address("gathering", port=1))
     try:
@@ -146,4 +146,4 @@ def test_only_a_flood_is_left_to_gather(monkeypatch: pytest.MonkeyPatch, every_s
             assert len(bus.receive()) == round(0.005 / every_s)
     finally:
         bus.close()
-    assert slept == ([mqtt.GATHER_S] * 9 if gathers else [])
+    assert slept == ([inbox.GATHER_S] * 9 if gathers else [])
