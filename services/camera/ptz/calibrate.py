@@ -1,11 +1,13 @@
 """Learning the motors on purpose: every speed of every axis once there and back, watched, and back to where it looked.
 
-The same filter learns as in every move; this only shows it each speed early. Nothing here pushes against a stop: each
-leg goes towards the middle of the range, and no farther than there is room for.
+The same filters learn as in every move; this only shows them each speed early, and where the firmware goes on by parts
+of the picture, how large these are at each zoom. Nothing here pushes against a stop: each leg goes towards the middle
+of the range, and no farther than there is room for.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
 
@@ -15,6 +17,7 @@ from services.camera.ptz.goal import Goal, Limits
 from services.camera.ptz.helm import Helm, levels_of
 from services.camera.ptz.move import Arrival, goto
 from services.camera.ptz.pace import HALF_CHANGE, READ_LATE
+from services.camera.ptz.scale import FORM
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
 from services.camera.requests import Reading, Status
@@ -24,6 +27,8 @@ LEG_S = 1.5  # each leg turns so long, or less where there is less room
 ROOM = 0.3  # of the way to the end stop that a leg may use
 FIRST_MOVE_DEG = 12.0  # shows the signs, and what the firmware honours
 MOVE_S = 60.0
+PLACES = 10  # for the relative form: moves between them are long, and each goes to another zoom
+MARGIN = 0.15  # of a range, at either end, in which none of them lies
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,10 @@ def calibrate(limits: Limits, skill: Skill) -> Plan[Arrival]:
     for axis in (PAN, TILT):
         for speed in skill.paces[axis].speeds:
             now = yield from _leg(limits, skill, axis, speed)
+    for goal in _places(limits):
+        now = (yield from goto(goal, limits, skill, now + MOVE_S)).at
+        if skill.honours.get(FORM) != "yes":
+            break
     return (yield from goto(began, limits, skill, now + MOVE_S))
 
 
@@ -57,6 +66,18 @@ def _aside(limits: Limits, began: Goal) -> Goal:
     low, high = limits.zoom
     zoom = began.pose[ZOOM] + (high - low) / 4 * (1 if began.pose[ZOOM] < (low + high) / 2 else -1)
     return Goal((aside[PAN], aside[TILT], zoom))
+
+
+def _places(limits: Limits) -> Iterator[Goal]:
+    """All over the ranges, the next one always far from the last."""
+    for number in range(PLACES):
+        parts = [(step * number % PLACES) / (PLACES - 1) for step in (3, 7)]
+        pan, tilt = (
+            low + (high - low) * (MARGIN + (1 - 2 * MARGIN) * part)
+            for part, (low, high) in zip(parts, limits.ranges, strict=False)
+        )
+        low, high = limits.zoom
+        yield Goal((pan, tilt, low + (high - low) * (number % 5) / 4))
 
 
 def _leg(limits: Limits, skill: Skill, axis: int, speed: int) -> Plan[float]:
