@@ -87,7 +87,9 @@ def test_a_stream_that_stands_still_is_noticed_and_opened_again(camera: RtspCame
         began = time.monotonic()
         wait_until(lambda: reader.flow.trouble != "", "the standstill to be noticed")
         assert time.monotonic() - began < 10
-        assert "no picture within" in reader.flow.trouble
+        wait_until(
+            lambda: "no picture within" in reader.flow.trouble, "the reason", 20
+        )  # on a busy machine it may break
         camera.tell("go")
         wait_until(lambda: reader.flow.name == "rtsp", "the stream again", 60)
         assert reader.flow.trouble == ""
