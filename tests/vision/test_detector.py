@@ -40,6 +40,7 @@ def test_nothing_is_invented_amid_what_looks_like_markers() -> None:
         (78820619, "shades within a frame, like a code out of focus"),
         (9721815, "stripes within a frame"),
         (34874345, "one light stripe within a narrow frame"),
+        (28498753, "a light spot within a narrow frame, smeared by motion"),
     ],
 )
 def test_what_was_once_taken_for_a_marker_is_none(seed: int, what: str) -> None:
