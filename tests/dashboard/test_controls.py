@@ -64,6 +64,7 @@ def test_the_frame_leads_to_every_view_and_changes_colours(shown: Page) -> None:
     expect(colours).to_have_text("auto")
     assert shown.evaluate("getComputedStyle(document.body).backgroundColor") != dark  # the machine's own is light
     shown.get_by_role("link", name="Health").click()
+    expect(shown.locator("main.view-health h1")).to_be_focused()  # a view takes the focus when it is there
     shown.get_by_text("Skip to content").focus()
     shown.keyboard.press("Enter")
     expect(shown.locator("main.view-health")).to_be_focused()
