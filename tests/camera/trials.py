@@ -205,7 +205,7 @@ def alarm_in_trouble(bus: Client) -> bool:
 
 
 def met(bus: Client) -> bool:
-    """Whether the service has asked all that it asks a camera first."""
+    """Whether the camera has said who it is."""
     said = newest(bus, "diagnostics/camera/ip1")
     return bool(said) and bool(json.loads(said)["values"]["firmware"])
 
