@@ -19,7 +19,7 @@ from services.vision.lens import Lens
 Array = NDArray[np.float64]
 
 RANDOM_PX = 0.02  # corner noise per axis of one frame, new in each, where their own scatter does not tell
-FIXED_PX = 0.016  # and what all frames of a place share: the pixel grid, the lens calibration
+FIXED_PX = 0.0145  # and what all frames of a place share: the pixel grid, the lens calibration
 FIXED_SIDES = 0.0003  # of the marker's side, shared too: paper and print
 FIXED_SHARE = 0.5  # of the random noise: what makes a picture worse does it to both; measured from .02/.026 to .07/.04
 KNOWN_FROM = 8.0  # numbers that RANDOM_PX counts as against the frames' own scatter
