@@ -9,6 +9,7 @@ by it is in `lens`; where markers are then, in `pose`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import atan2, ceil, degrees, hypot, log, sqrt
 
@@ -27,20 +28,22 @@ COARSE_PX = 384  # width of the small pictures in which the whole range is tried
 STEP = 1.025  # between two magnifications tried: the edges are off by 5 of the small pixels at most
 ROOM_PX = 16  # of the small pictures: how far the middle may have moved
 EVEN_PX = 10.0  # sigma of what counts as brightness, not as detail, in the small pictures and in the large ones
-FLAT = 3.0  # grey levels; what varies less is noise
+FLAT = 1.5  # grey levels; what varies less is noise. A bare wall's clouds must weigh beside a title over the picture
 LIKE = 0.3  # correlation of the small pictures below which they do not show the same
-WORK_PX = 1152  # width at which points are followed: larger adds time, hardly detail
+# The width at which points are followed: larger adds time, hardly detail. And how far, in each round, a point may be
+# from the others' similarity, in pixels of the wide picture: one that is farther is none of them.
+WORK_PX, FAR_PX = 1152, (6.0, 1.5)
+SOFT_WORK_PX, SOFT_FAR_PX = 384, (12.0, 3.0)  # the same where outlines are few: a bare wall's clouds outlast the noise
+SURE = 0.0003  # share; a magnification less sure than this by its outlines is measured softly
 POINTS, APART_PX, WINDOW_PX = 600, 10, 21  # followed points: how many, how far apart, and what is compared around each
 FEWEST = 20  # points that must agree
 LEAST_SPREAD = 0.04  # of the zoomed picture's width that they must spread over (root mean square)
-FAR_PX = (6.0, 1.5)  # in each round: a point that is farther from the others' similarity is none of them
 ROTATED_DEG = 0.2  # a zoom does not turn the picture; more is a mistake
 ASIDE = 0.1  # of the picture's width: how far the middle may move
 TUKEY, REWEIGHTINGS = 4.685, 15
 RAYLEIGH_MEDIAN = 1.1774  # of a distance in the plane, in standard deviations of a coordinate
 FLOOR_PX = 0.02  # scatter of the points below which none counts as an outlier
 TOGETHER = 4.0  # points are not independent, neighbours err together: as if there were so many times fewer
-LEVER = 0.25  # of the width: the points' own middle is mostly as near to that of the picture
 MIDDLE_PX = 0.02  # how well the middle is known at best
 SYSTEMATIC = 0.0002  # share of the magnification: interpolation, JPEG, the camera's own resize
 
@@ -114,27 +117,34 @@ def measure(wide: Picture, zoomed: Picture, between: tuple[float, float] = (1.0,
         raise ValueError("the zoomed picture has another shape than the wide one")
     height, width = first.shape
     second = second if second.shape == first.shape else _resized(second, width, height)
-    sure = _coarse(first, second, between)
-    for far in FAR_PX:
-        here, there = _followed(first, second, sure)
+    roughly = _coarse(first, second, between)
+    with suppress(ValueError):
+        by_outlines = _agreed(first, second, roughly, WORK_PX, FAR_PX)
+        if by_outlines.relative <= SURE:
+            return by_outlines
+    return _agreed(first, second, roughly, SOFT_WORK_PX, SOFT_FAR_PX)
+
+
+def _agreed(wide: Picture, zoomed: Picture, roughly: Array, work_px: int, far_px: Sequence[float]) -> Magnification:
+    """What points of both agree on, followed in pictures of this width; ValueError when they do not."""
+    height, width = wide.shape
+    sure = roughly
+    for far in far_px:
+        here, there = _followed(wide, zoomed, sure, work_px)
         sure, scatter, weights = _similarity(here, there, far * max(1.0, _times(sure)))
         spread = _spread(there, weights)
         if len(here) < FEWEST or spread < LEAST_SPREAD * width or weights.sum() < FEWEST:
             raise ValueError("the zoomed picture and the wide one have too little in common")
-    sigma = scatter * sqrt(TOGETHER / weights.sum()) / spread
-    return _checked(sure, sigma, width, height)
-
-
-def _checked(similar: Array, scatter: float, width: int, height: int) -> Magnification:
-    """The similarity as a magnification, unsure by such a share; ValueError when no zoom does that."""
-    times = _times(similar)
-    middle = np.array([(width - 1) / 2, (height - 1) / 2])
-    right, down = (similar[:, :2] @ middle + similar[:, 2] - middle) / width
-    turned = abs(degrees(atan2(similar[1, 0], similar[0, 0])))
-    if turned > ROTATED_DEG + degrees(3 * scatter) or hypot(right, down) > ASIDE * times:
+    moved = scatter * sqrt(TOGETHER / weights.sum())
+    times, share = _times(sure), moved / spread
+    middle, (start, end) = np.array([(width - 1) / 2, (height - 1) / 2]), (weights @ (here, there) / weights.sum())
+    right, down = (times * (middle - start) + end - middle) / width  # as without a turn, which is noise of the points
+    turned = abs(degrees(atan2(sure[1, 0], sure[0, 0])))
+    if turned > ROTATED_DEG + degrees(3 * share) or hypot(right, down) > ASIDE * times:
         raise ValueError(f"no zoom turns the picture by {turned:.1f} degrees and moves it by {hypot(right, down):.0%}")
-    sigma = times * hypot(scatter, SYSTEMATIC)
-    return Magnification(times, sigma, float(right), float(down), LEVER * scatter + MIDDLE_PX / width)
+    lever = float(np.linalg.norm(end - middle))
+    aside = hypot(moved, lever * share, MIDDLE_PX) / width
+    return Magnification(times, times * hypot(share, SYSTEMATIC), float(right), float(down), aside)
 
 
 def _times(similar: Array) -> float:
@@ -180,12 +190,12 @@ def _coarse(wide: Picture, zoomed: Picture, between: tuple[float, float]) -> Arr
     return np.array([[times, 0, 0.5 * times - left - 0.5], [0, times, 0.5 * times - top - 0.5]])
 
 
-def _followed(wide: Picture, zoomed: Picture, similar: Array) -> tuple[Array, Array]:
+def _followed(wide: Picture, zoomed: Picture, similar: Array, work_px: int) -> tuple[Array, Array]:
     """Points (n, 2) of the wide picture and where they are in the zoomed one (Lucas and Kanade's method).
 
     The zoomed one is brought to the wide one's scale first, so that the ways are short.
     """
-    first, second, to_wide = _together(wide, zoomed, similar)
+    first, second, to_wide = _together(wide, zoomed, similar, work_px)
     found = cv2.goodFeaturesToTrack(first, POINTS, 0.02, APART_PX, blockSize=7)
     if found is None or len(found) < FEWEST:
         return np.zeros((0, 2)), np.zeros((0, 2))
@@ -199,7 +209,7 @@ def _followed(wide: Picture, zoomed: Picture, similar: Array) -> tuple[Array, Ar
     return here, there @ similar[:, :2].T + similar[:, 2]
 
 
-def _together(wide: Picture, zoomed: Picture, similar: Array) -> tuple[Picture, Picture, Array]:
+def _together(wide: Picture, zoomed: Picture, similar: Array, work_px: int) -> tuple[Picture, Picture, Array]:
     """The part of the wide picture that the zoomed one shows, both at one scale; and from there to the wide (2, 3)."""
     height, width = wide.shape
     times = _times(similar)
@@ -208,7 +218,7 @@ def _together(wide: Picture, zoomed: Picture, similar: Array) -> tuple[Picture, 
     low = np.clip(np.floor((left, top)), 0, None).astype(int)
     high = np.clip(np.ceil((right, bottom)), None, (width, height)).astype(int)
     part = wide[low[1] : high[1], low[0] : high[0]]
-    shrink = min(1.0, WORK_PX / max(part.shape[1], 1))
+    shrink = min(1.0, work_px / max(part.shape[1], 1))
     if min(part.shape) < WINDOW_PX:
         raise ValueError("the zoomed picture and the wide one have too little in common")
     size = (round(part.shape[1] * shrink), round(part.shape[0] * shrink))
@@ -229,7 +239,9 @@ def _similarity(start: Array, end: Array, far_px: float) -> tuple[Array, float, 
     if np.isfinite(far_px) and len(start) >= FEWEST:
         _, inside = cv2.estimateAffinePartial2D(start, end, ransacReprojThreshold=far_px)
         weights = inside[:, 0].astype(float)
-    for _ in range(REWEIGHTINGS if weights.sum() > 2 else 0):
+    for _ in range(REWEIGHTINGS):
+        if weights.sum() <= 2:
+            break
         similar = _fitted(start, end, weights)
         off = np.linalg.norm(start @ similar[:, :2].T + similar[:, 2] - end, axis=1)
         scatter = max(float(np.median(off[weights > 0])) / RAYLEIGH_MEDIAN, FLOOR_PX)

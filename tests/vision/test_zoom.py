@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,6 +15,8 @@ from services.simulators.camera.view.scene import Scene
 from services.simulators.world import load
 from services.vision.lens import Lens
 from services.vision.zoom import Level, Magnification, at_level, measure
+from tests.vision import sighted
+from tests.vision.sighted import flat
 
 WORLD = load(Path(__file__).parents[2] / "config/world.yaml")
 CAMERA = WORLD.cameras["ip1"]
@@ -52,6 +56,37 @@ def test_another_picture_mode_and_less_light_do_not_disturb(scene: Scene) -> Non
     dark = np.clip(zoomed * 0.25 + np.random.default_rng(1).normal(0, 5, zoomed.shape), 0, 255).astype(np.uint8)
     for other in (hard, dark):
         assert abs(measure(wide, other).times / 1.6 - 1) < 0.002
+
+
+@pytest.mark.parametrize(
+    ("seed", "pan", "tilt", "times"), [(213, 88, 14, 2.0), (213, 210, 15, 2.6), (217, 81, 5, 2.4), (229, 39, 15, 1.9)]
+)
+def test_where_hardly_more_than_a_wall_is_seen_its_clouds_tell(seed: int, pan: float, tilt: float, times: float):
+    room, rng = flat(seed), np.random.default_rng(seed)
+    pose = room.camera.pose(pan, tilt)
+    found = measure(sighted.photograph(room, pose, 1.0, rng), sighted.photograph(room, pose, times, rng))
+    assert abs(found.times / times - 1) < 0.002
+    assert abs(found.times - times) < 4 * found.sigma
+
+
+@pytest.mark.parametrize("titled", [False, True])
+def test_walls_without_anything_never_deceive_even_with_a_title_over_both_pictures(titled: bool) -> None:
+    """Some are told by their clouds, a few grey levels deep, and the line to the ceiling; others are refused."""
+    off = []
+    for seed in range(12):
+        furnished, rng, times = flat(seed), np.random.default_rng(seed), (1.4, 2.0, 2.6)[seed % 3]
+        bare = furnished.world.model_copy(update={"furniture": ()})
+        room = replace(furnished, world=bare, scene=Scene(bare, furnished.camera.lens, seed))
+        pose = room.camera.pose(40.0 * seed, 6.0)
+        wide, zoomed = (sighted.photograph(room, pose, each, rng) for each in (1.0, times))
+        for image in (wide, zoomed) if titled else ():
+            cv2.putText(image, "2026-11-23 10:00:00", (1750, 60), cv2.FONT_HERSHEY_SIMPLEX, 1.6, (255, 255, 255), 3)
+            cv2.putText(image, "Living room", (40, 1260), cv2.FONT_HERSHEY_SIMPLEX, 1.6, (255, 255, 255), 3)
+        with suppress(ValueError):
+            found = measure(wide, zoomed)
+            off.append((found.times - times, found.sigma))
+    assert off
+    assert all(abs(wrong) < 4 * sigma < 0.04 for wrong, sigma in off), off
 
 
 def test_what_somebody_moved_meanwhile_does_not_disturb(scene: Scene) -> None:
