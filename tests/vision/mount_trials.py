@@ -109,8 +109,19 @@ def seen(camera: Transform, marker: Transform) -> Array | None:
 
 
 def centred(mount: Mount, point: Array) -> tuple[float, float]:
-    """The readings at which a point is in the middle of the picture, by search."""
-    pan, tilt = 0.0, 45.0
+    """The readings at which a point is in the middle of the picture, by search from all around."""
+    found = [_search(mount, point, float(pan)) for pan in range(0, 360, 60)]
+    return max(found, key=lambda readings: _ahead(mount, point, *readings))
+
+
+def _ahead(mount: Mount, point: Array, pan: float, tilt: float) -> float:
+    """The cosine of the angle between a point and the middle of the picture."""
+    place = camera_in_apartment(mount, pan, tilt).inverse().apply(point)
+    return float(place[2] / np.linalg.norm(place))
+
+
+def _search(mount: Mount, point: Array, pan: float) -> tuple[float, float]:
+    tilt = 45.0
     for _ in range(20):
         x, y, z = camera_in_apartment(mount, pan, tilt).inverse().apply(point)
         sign = 1.0 if mount.kind == "ceiling" else -1.0
