@@ -22,7 +22,7 @@ TRIM = 0.12  # of a side left out at both ends, where the other side's edge is n
 REACH_MODULES = 0.7  # how far profiles reach: not over the border into the cells or the quiet zone into the wall
 REACH_PX = (1.5, 4.0)  # and the least and most of that in pixels; an edge is as wide as a pixel was enlarged
 STEP_PX = 0.5  # along a profile
-NOISE_GREY = 4.0  # grey levels a pixel; a gradient below it says more of the noise than of an edge
+NOISE_GREY, NOISE_SHARE = 4.0, 0.2  # grey levels a pixel, and of a profile's steepest: what is below both is noise
 PROFILES = (12, 64)  # least and most per side; about one for each pixel
 TUKEY = 4.685  # cut-off of the robust line in standard deviations (95 % efficient, Huber 1981)
 REWEIGHTINGS = 12  # of the robust line: a scratch over a tenth of a side is gone by then
@@ -83,7 +83,8 @@ def _edge_points(grey: Picture, squares: Array, modules: int, profiles: int) -> 
     profile = sample(grey, _across(middle_x, out_x, steps), _across(middle_y, out_y, steps))
     behind, ahead = profile[..., :-2], profile[..., 2:]
     rise = (np.maximum(ahead, behind) - behind).astype(np.float32)  # dark to light only: cells do the opposite
-    rise = np.maximum(rise - np.float32(NOISE_GREY), 0)
+    steepest = rise.max(axis=-1, keepdims=True)
+    rise = np.maximum(rise - np.minimum(np.float32(NOISE_SHARE) * steepest, np.float32(NOISE_GREY)), 0)
     strength = rise.sum(axis=-1, dtype=float)
     offset = (rise * steps[:, None, None, 1:-1].astype(np.float32)).sum(axis=-1) / np.maximum(strength, 1e-9)
     return middle_x + offset * out_x[..., None], middle_y + offset * out_y[..., None], strength

@@ -65,6 +65,15 @@ def test_scratch_across_one_side_does_not_move_the_corners(seed):
     assert mean_error(refine(image, truth, 7), truth) < 0.1
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_edges_of_a_few_grey_levels_are_enough(seed: int) -> None:
+    image, truth = view(seed, 120, blur=2.5, noise=2.0)
+    faint = np.rint(image * 0.05 + 10).astype(np.uint8)
+    found = refine(faint, truth + np.random.default_rng(seed).uniform(-0.7, 0.7, (4, 2)), 7)
+    assert found is not None
+    assert mean_error(found, truth) < 0.5
+
+
 def test_square_without_edges_is_none():
     square = np.array([[100.0, 100], [140, 100], [140, 140], [100, 140]])
     assert refine(np.full((240, 320), 120, np.uint8), square, 7) is None
