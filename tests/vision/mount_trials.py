@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from services.vision.aim import readings_at
 from services.vision.calibrate_mount import MountFit, fit
 from services.vision.frames import Mount, Transform, camera_in_apartment, rotation_x, rotation_z
 from services.vision.mount_squares import SQUARE, Known, Look
@@ -83,7 +84,7 @@ def looks_at(
     """Each marker from three readings as the camera tells them (None: exactly), and what else is in the picture."""
     looks = []
     for marker in markers.values():
-        pan, tilt = centred(mount, marker.translation)
+        pan, tilt = readings_at(mount, marker.translation)
         for aside, below in ASIDE:
             true = (pan + aside, tilt + below)
             camera = camera_in_apartment(mount, *true)
@@ -106,29 +107,6 @@ def seen(camera: Transform, marker: Transform) -> Array | None:
     away = np.abs(points[:, :2] / points[:, 2:]).max() > 1.0
     outside = (pixels < 20).any() or (pixels > np.array([PLAIN.width, PLAIN.height]) - 20).any()
     return None if away or outside else pixels
-
-
-def centred(mount: Mount, point: Array) -> tuple[float, float]:
-    """The readings at which a point is in the middle of the picture, by search from all around."""
-    found = [_search(mount, point, float(pan)) for pan in range(0, 360, 60)]
-    return max(found, key=lambda readings: _ahead(mount, point, *readings))
-
-
-def _ahead(mount: Mount, point: Array, pan: float, tilt: float) -> float:
-    """The cosine of the angle between a point and the middle of the picture."""
-    place = camera_in_apartment(mount, pan, tilt).inverse().apply(point)
-    return float(place[2] / np.linalg.norm(place))
-
-
-def _search(mount: Mount, point: Array, pan: float) -> tuple[float, float]:
-    tilt = 45.0
-    for _ in range(20):
-        x, y, z = camera_in_apartment(mount, pan, tilt).inverse().apply(point)
-        sign = 1.0 if mount.kind == "ceiling" else -1.0
-        pan += sign * degrees(float(np.arctan2(x, np.hypot(z, y)))) / max(np.cos(np.radians(min(abs(tilt), 80))), 0.2)
-        tilt += sign * degrees(float(np.arctan2(y, z)))
-        tilt = float(np.clip(tilt, -95, 95)) if z > 0 else 30.0
-    return pan, tilt
 
 
 def placed(rng: np.random.Generator, markers: dict[int, Transform], off_m: float = PLACED_M) -> dict[int, Known]:
