@@ -23,11 +23,15 @@ REACH_MODULES = 0.7  # how far profiles reach: not over the border into the cell
 REACH_PX = (1.5, 4.0)  # and the least and most of that in pixels; an edge is as wide as a pixel was enlarged
 STEP_PX = 0.5  # along a profile
 NOISE_GREY, NOISE_SHARE = 4.0, 0.2  # grey levels a pixel, and of a profile's steepest: what is below both is noise
+WHOLE_PX = 1.5  # an edge that is nearer to the picture's own is cut off, and seems to lie elsewhere
+WHOLE_STRENGTH = 0.3  # of a marker's strongest: at the picture's edge, what is weaker is none of its own
+LEAST_SHOWN = 0.3  # of a side that leaves the picture: less tells the corner beyond to a few pixels only
 PROFILES = (12, 64)  # least and most per side; about one for each pixel
 TUKEY = 4.685  # cut-off of the robust line in standard deviations (95 % efficient, Huber 1981)
 REWEIGHTINGS = 12  # of the robust line: a scratch over a tenth of a side is gone by then
 OFFSET_FLOOR_PX = 0.03  # spread of edge points below which none counts as an outlier
 FARTHEST_PX = 4.0  # a corner that walks farther than this from where it was found belongs to something else
+FARTHEST_BEYOND_PX = 12.0  # the same of one beyond the picture, of which an outline shows nothing
 QUICK = (2, 16, 4)  # rounds, profiles and reweightings where many squares are to be told apart
 
 
@@ -65,7 +69,8 @@ def _refined(grey: Picture, squares: Array, modules: int, rounds: int, profiles:
     for _ in range(rounds):
         edge = _edge_points(grey, np.nan_to_num(refined), modules, profiles)
         crossed = _cross(*_lines(*edge, reweightings))
-        near = np.abs(crossed - squares).max(axis=(1, 2), initial=0) < FARTHEST_PX  # not so for NaN
+        farthest = np.where(_shown(grey, crossed[..., 0], crossed[..., 1]), FARTHEST_PX, FARTHEST_BEYOND_PX)
+        near = (np.abs(crossed - squares).max(axis=2) < farthest).all(axis=1)  # not so for NaN
         refined = np.where(near[:, None, None], crossed, np.nan)
     return refined
 
@@ -80,14 +85,34 @@ def _edge_points(grey: Picture, squares: Array, modules: int, profiles: int) -> 
     middle_x, middle_y = (squares[..., axis, None] + share * along[..., axis, None] for axis in (0, 1))
     count = round(float(reach.max(initial=REACH_PX[0])) / STEP_PX)
     steps = reach[:, None] * np.linspace(-1, 1, 2 * count + 1)
-    profile = sample(grey, _across(middle_x, out_x, steps), _across(middle_y, out_y, steps))
+    x, y = _across(middle_x, out_x, steps), _across(middle_y, out_y, steps)
+    profile = sample(grey, x, y)
     behind, ahead = profile[..., :-2], profile[..., 2:]
     rise = (np.maximum(ahead, behind) - behind).astype(np.float32)  # dark to light only: cells do the opposite
+    cut = np.flatnonzero(~_shown(grey, x[..., [0, -1]], y[..., [0, -1]]).all(axis=(1, 2, 3)))
+    inside = _shown(grey, x[cut], y[cut])
+    rise[cut] *= inside[..., :-2] & inside[..., 2:]
     steepest = rise.max(axis=-1, keepdims=True)
     rise = np.maximum(rise - np.minimum(np.float32(NOISE_SHARE) * steepest, np.float32(NOISE_GREY)), 0)
     strength = rise.sum(axis=-1, dtype=float)
     offset = (rise * steps[:, None, None, 1:-1].astype(np.float32)).sum(axis=-1) / np.maximum(strength, 1e-9)
-    return middle_x + offset * out_x[..., None], middle_y + offset * out_y[..., None], strength
+    x, y = middle_x + offset * out_x[..., None], middle_y + offset * out_y[..., None]
+    strength[cut] *= _whole(grey, x[cut], y[cut], strength[cut])
+    return x, y, strength
+
+
+def _whole(grey: Picture, x: Array, y: Array, strength: Array) -> NDArray[np.bool_]:
+    """Which edge points (n, 4, p) of squares at the picture's edge are of a side that is seen, and not cut off."""
+    whole = _shown(grey, x, y, WHOLE_PX) & (strength > WHOLE_STRENGTH * strength.max(axis=(1, 2), keepdims=True))
+    shown = whole.mean(axis=2, keepdims=True) > LEAST_SHOWN
+    return np.asarray(whole & shown, np.bool_)
+
+
+def _shown(grey: Picture, x: NDArray[Any], y: NDArray[Any], within: float = 0.0) -> NDArray[np.bool_]:
+    """Whether x, y lie in the picture, and so far from its edge: there is nothing to be learnt beyond."""
+    height, width = grey.shape
+    shown = (x >= within) & (x <= width - 1 - within) & (y >= within) & (y <= height - 1 - within)
+    return np.asarray(shown, np.bool_)
 
 
 def _across(middle: Array, outward: Array, steps: Array) -> NDArray[np.float32]:
@@ -101,7 +126,8 @@ def _lines(x: Array, y: Array, strength: Array, reweightings: int) -> tuple[Arra
     trust = np.sqrt(strength)
     weights = trust
     for _ in range(reweightings):
-        total = np.maximum(weights.sum(axis=2), 1e-9)
+        total = weights.sum(axis=2)
+        total = np.where(total > 0, total, np.nan)  # no line where there is no edge
         middle_x, middle_y = ((weights * at).sum(axis=2) / total for at in (x, y))
         right, down = x - middle_x[..., None], y - middle_y[..., None]
         weighted = weights * right

@@ -42,6 +42,7 @@ RIMMED, RIM = 0.85, (3.0, 2.0)  # share of a square's outline with paper beside 
 LIKELY = 0.75  # likeness to a code, in whatever light, of a square that is worth to be seen in one light
 MOST_LIKELY = 5  # of them
 SURE = 30.0  # belief of a marker that needs no other light
+EDGE_PX = 1.5  # a corner that is nearer to the picture's edge is as good as beyond it
 SEARCHERS = 2  # threads: the picture itself has about as many outlines as all smaller ones
 
 
@@ -55,6 +56,11 @@ class Detection:
     marker: int
     corners: Array
     confidence: float
+
+    def whole(self, width: int, height: int) -> bool:
+        """Whether all of it is in the picture: a corner beyond was told by what is seen of its sides, or not at all."""
+        farthest = np.array([width, height]) - 1 - EDGE_PX
+        return bool(((self.corners >= EDGE_PX) & (self.corners <= farthest)).all())
 
 
 def detect(image: Picture, dictionary: str, targets: Collection[int] | None = None) -> list[Detection]:

@@ -74,6 +74,41 @@ def test_edges_of_a_few_grey_levels_are_enough(seed: int) -> None:
     assert mean_error(found, truth) < 0.5
 
 
+def cut_off(seed: int, edge: int) -> tuple[np.ndarray, np.ndarray]:
+    """A picture that ends within the marker, at its left (0), top, right or bottom edge, and the true corners."""
+    image, truth = view(seed, 40 + seed)
+    low, high = truth[:, 0].min(), truth[:, 0].max()
+    first = round(low + np.random.default_rng(seed).uniform(0.0, 0.25) * (high - low))
+    image, truth = image[:, first:], truth - (first, 0)
+    for _ in range(edge):
+        image, truth = np.rot90(image, -1), np.column_stack((image.shape[0] - 1 - truth[:, 1], truth[:, 0]))
+    return np.ascontiguousarray(image), truth
+
+
+@pytest.mark.parametrize("edge", range(4))
+def test_corners_beyond_the_picture_are_told_by_what_is_seen_of_their_sides_or_not_at_all(edge: int) -> None:
+    off = []
+    for seed in range(40):
+        image, truth = cut_off(seed, edge)
+        beyond = ((truth < 0) | (truth > np.array(image.shape[::-1]) - 1)).any(axis=1)
+        found = refine(image, truth + np.random.default_rng(seed).uniform(-0.7, 0.7, (4, 2)), 7)
+        if beyond.any() and found is not None:
+            off.append(np.linalg.norm(found - truth, axis=1).max())
+    assert len(off) >= 15
+    assert np.median(off) < 0.15
+    assert max(off) < 1.5
+
+
+@pytest.mark.parametrize("edge", range(4))
+def test_a_side_beyond_the_picture_is_not_taken_for_the_picture_s_own_edge(edge: int) -> None:
+    image, truth = np.full((240, 320), 205, np.uint8), np.array([[100.0, -10], [140, -10], [140, 30], [100, 30]])
+    image[:31, 100:141] = 35
+    for _ in range(edge):
+        image, truth = np.rot90(image, -1), np.column_stack((image.shape[0] - 1 - truth[:, 1], truth[:, 0]))
+    shown = np.clip(truth, 0, np.array(image.shape[::-1]) - 1)
+    assert refine(np.ascontiguousarray(image), shown, 7) is None
+
+
 def test_square_without_edges_is_none():
     square = np.array([[100.0, 100], [140, 100], [140, 140], [100, 140]])
     assert refine(np.full((240, 320), 120, np.uint8), square, 7) is None

@@ -152,6 +152,13 @@ def test_squares_with_random_cells_are_rarely_a_target():
     assert len(false) <= 2
 
 
+def test_a_marker_is_whole_where_all_its_corners_are_in_the_picture() -> None:
+    square = np.array([[10.0, 10], [50, 10], [50, 50], [10, 50]])
+    assert Detection(582, square, 1.0).whole(640, 480)
+    for move in ((-20, 0), (0, -20), (595, 0), (0, 435), (-9, 0), (0, 428.5)):
+        assert not Detection(582, square + np.array(move), 1.0).whole(640, 480)
+
+
 def test_unknown_dictionary_names_the_choices():
     with pytest.raises(ValueError, match=r"dictionary: expected one of .*DICT_5X5_1000.*got 'DICT_9X9'"):
         detect(np.zeros((48, 64), np.uint8), "DICT_9X9")

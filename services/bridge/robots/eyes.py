@@ -66,7 +66,7 @@ def look(
 
 
 def _placed(one: Detection, seen_by: Lens | None, camera: Transform | None, size: float) -> SeenMarker:
-    if seen_by is None or camera is None:
+    if seen_by is None or camera is None or not one.whole(seen_by.width, seen_by.height):
         return SeenMarker(marker=one.marker)
     try:
         found = locate([View(seen_by, camera, one.corners, size)])

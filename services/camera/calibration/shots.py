@@ -100,6 +100,6 @@ def markers_in(
 
 
 def _once(image: pictures.Image, dictionary: str, targets: Sequence[int] | None) -> dict[int, Array]:
-    seen = detect(image, dictionary, targets)
+    seen = [one for one in detect(image, dictionary, targets) if one.whole(image.shape[1], image.shape[0])]
     ids = [one.marker for one in seen]
     return {one.marker: np.asarray(one.corners, float) for one in seen if ids.count(one.marker) == 1}

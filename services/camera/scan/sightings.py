@@ -23,7 +23,7 @@ from services.vision.zoom import WIDEST, Level, Magnification, at_level
 LEAST_TIMES = 1.1  # what a zoom magnifies by at least, of which that is not known
 MOST_SLACK_DEG = 3.0
 HALF_HEIGHT = 9 / 16  # over the focal length, of a lens that is not known: about 90 degrees wide
-CUT_OFF = 6.0  # times the noise of corners: all edges seem 0.03 to 0.09 px beside there
+COARSE = 6.0  # times the noise of corners: cut-off light moves all edges by 0.03 to 0.09 px, the picture's edge by 0.08
 WELL_KNOWN = 0.01  # share of the magnification's uncertainty above which no distance is told: 5 cm at 5 m
 
 
@@ -42,6 +42,11 @@ class Sighting:
     size: tuple[int, int]
     magnified: Magnification | None = None
     cut_off: bool = False
+
+    @property
+    def coarse(self) -> bool:
+        """Whether its corners are less exact than others: its light is cut off, or itself by the picture's edge."""
+        return self.cut_off or not self.detection.whole(*self.size)
 
     @property
     def off_centre(self) -> float:
@@ -180,7 +185,7 @@ def _view(eye: Eye, lens: Lens, mount: Mount, sought: Sought, sighting: Sighting
         angle_noise_deg=eye.angle_noise_deg,
         focal_doubt=magnified.relative,
         aside_deg=degrees(magnified.aside * zoomed.width / zoomed.focal),
-        enlarged=max(1.0, magnified.times) * (CUT_OFF if sighting.cut_off else 1.0),
+        enlarged=max(1.0, magnified.times) * (COARSE if sighting.coarse else 1.0),
         axes=axes_in_apartment(mount, reading.pan, reading.tilt),
         at=sighting.at,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from math import inf
 from typing import Any
 
@@ -19,6 +20,7 @@ from services.errors import BadMessage
 from services.payloads.robot import RobotPose, RobotSeen
 from services.simulators.robot import eye
 from services.simulators.world import load
+from services.vision.detect import detect
 from services.vision.frames import Transform, quaternion, rotation_z
 from tests.bridge.test_service import CONFIG
 
@@ -119,6 +121,23 @@ def test_a_marker_in_its_picture_is_where_it_is_in_the_map() -> None:
     (found,) = [one for one in markers if one.marker == 582]
     assert [found.position.x, found.position.y, found.position.z] == pytest.approx(marker, abs=0.03)
     assert sensing.seen() == [], "a picture is looked at once"
+
+
+def test_a_marker_that_the_picture_cuts_off_is_seen_but_not_where() -> None:
+    world = load(CONFIG / "world.yaml")
+    marker = world.marker(582).pose.translation
+    camera = at(float(marker[0]) - 0.1, float(marker[1]) - 1.2, 85.0) @ eye.in_base(1.1, 22.0)
+    pixels, lens = eye.Eye(world, 1).picture(camera), eyes.lens(eye.camera_info())
+    assert lens is not None
+    (there,) = (one.corners for one in detect(pixels, "DICT_5X5_1000", [582]))
+
+    def placed(last: float) -> list[bool]:
+        part = np.ascontiguousarray(pixels[:, : round(last)])
+        seen = eyes.look(part, "DICT_5X5_1000", replace(lens, width=part.shape[1]), camera, {}, 0.14)
+        return [one.position is not None for one in seen if one.marker == 582]
+
+    assert placed(there[:, 0].max() + 20) == [True]
+    assert placed(there[:, 0].max() - 1) == [False]
 
 
 @pytest.mark.parametrize("encoding", sorted(eyes.PIXELS))

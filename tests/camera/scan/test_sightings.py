@@ -140,6 +140,17 @@ def test_two_markers_of_one_id_that_are_seen_together_are_two_results() -> None:
     assert sorted(round(min(off_mm(result, marker) for result in found), 1) for marker in (one, other)) <= [0.5, 0.5]
 
 
+def test_a_marker_at_the_picture_s_edge_counts_less_than_one_that_is_seen_whole() -> None:
+    marker, aside = ahead(HERE), Reading(30.0, 19.0, 0.0)  # there the picture's edge goes through it
+    whole, cut = seen(marker), seen(marker, aside, at=110.0)
+    assert all(one.detection.whole(2304, 1296) for one in whole)
+    assert not any(one.detection.whole(2304, 1296) for one in cut)
+    wrong = [replace(one, detection=replace(one.detection, corners=one.detection.corners + 0.3)) for one in cut]
+    (both,), (alone,) = said([*whole, *wrong]), said(cut)
+    assert off_mm(both, marker) < 0.5
+    assert np.trace(np.array(alone.covariance)) > 4 * np.trace(np.array(said(whole)[0].covariance))
+
+
 def test_the_mount_s_own_doubt_is_in_the_covariance() -> None:
     sightings = seen(ahead(HERE, metres=4.0))
     doubt = np.diag(np.square([0.01] * 3 + [np.radians(0.1)] * 3))
