@@ -103,7 +103,8 @@ def _linear(sights: Sights, state: _State, prior: Prior | None) -> tuple[Array, 
     slope[..., :3], slope[..., 3:6] = by_turn.reshape(count, 8, 3), by_place.reshape(count, 8, 3)
     for index in range(count):
         slope[index, :, 6 + 4 * index : 10 + 4 * index] = own[index].reshape(8, 4)
-    return _with_priors(state, prior, off.ravel(), slope.reshape(8 * count, -1))
+    residuals, slope = sights.by_sides @ off.reshape(count, 8, 1), sights.by_sides @ slope
+    return _with_priors(state, prior, residuals.ravel(), slope.reshape(8 * count, -1))
 
 
 def _with_priors(state: _State, prior: Prior | None, off: Array, slope: Array) -> tuple[Array, Array]:

@@ -38,7 +38,7 @@ class Hypothesis:
     """An orientation of the marker, 3x3 T_AM, and what the sights make of it."""
 
     orientation: Array
-    residuals: Array  # (8 g,) of the corners in standard deviations, and what the prior adds
+    residuals: Array  # (8 g,) of the sides in standard deviations, and what the prior adds
     places: Array  # (g, 3) where each sight would have the marker, in the apartment
     possible: bool  # in front of every lens, its face to it
 
@@ -49,9 +49,9 @@ class Hypothesis:
 
     @property
     def seen(self) -> float:
-        """That of the corners alone."""
-        corners = self.residuals[: 8 * len(self.places)]
-        return float(corners @ corners)
+        """That of the sides alone."""
+        sides = self.residuals[: 8 * len(self.places)]
+        return float(sides @ sides)
 
 
 def ranked(sights: Sights, prior: Prior | None = None) -> list[Hypothesis]:
@@ -98,10 +98,12 @@ def _explain(sights: Sights, orientation: Array, prior: Prior | None) -> Hypothe
     spread = np.einsum("gji,jk,gck->gci", sights.rotation, orientation, SQUARE * sights.size[:, None, None])
     system = np.concatenate((np.broadcast_to(np.eye(2), (*sights.rays.shape, 2)), -sights.rays[..., None]), axis=-1)
     shift = (sights.rays * spread[..., 2:] - spread[..., :2]).reshape(-1, 8)
-    centre = np.einsum("gij,gj->gi", np.linalg.pinv(system.reshape(-1, 8, 3)), shift)
+    weighed = np.linalg.pinv(sights.by_sides @ system.reshape(-1, 8, 3)) @ sights.by_sides
+    centre = np.einsum("gij,gj->gi", weighed, shift)
     corners = spread + centre[:, None]
     with np.errstate(all="ignore"):
-        residuals = (corners[..., :2] / corners[..., 2:] - sights.rays) / sights.noise[:, None, None]
+        off = (corners[..., :2] / corners[..., 2:] - sights.rays) / sights.noise[:, None, None]
+        residuals = np.einsum("gij,gj->gi", sights.by_sides, off.reshape(-1, 8))
     facing = np.einsum("gji,j,gi->g", sights.rotation, orientation[:, 2], centre) < 0
     places = np.einsum("gij,gj->gi", sights.rotation, centre) + sights.lens_at
     possible = bool(facing.all() and (corners[..., 2] > 0).all() and np.isfinite(residuals).all())

@@ -7,7 +7,8 @@ not where it was are another sight: it was moved, it is another one of the same 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 from math import asin, degrees, sqrt
 
 import numpy as np
@@ -19,9 +20,10 @@ from services.vision.lens import Lens
 Array = NDArray[np.float64]
 
 RANDOM_PX = 0.02  # corner noise per axis of one frame, new in each, where their own scatter does not tell
-FIXED_PX = 0.0145  # and what all frames of a place share: the pixel grid, the lens calibration
-FIXED_SIDES = 0.0003  # of the marker's side, shared too: paper and print
-FIXED_SHARE = 0.5  # of the random noise: what makes a picture worse does it to both; measured from .02/.026 to .07/.04
+FIXED_PX = 0.019  # and what all frames of a place share: the pixel grid, the lens calibration; measured, however noisy
+FIXED_SIDES = 0.0003  # of the marker's side, shared too: what the lens bends, paper and print
+NODES = 0.219  # of a side, from its middle: in two such places is a line, fitted to 0.76 of a side, off independently,
+NODE_NOISE = 0.568  # by this share of what a corner is off, in which two such lines cross
 KNOWN_FROM = 8.0  # numbers that RANDOM_PX counts as against the frames' own scatter
 SAME_PLACE_M, SAME_PLACE_DEG = 0.005, 0.2  # readings that differ by less are one place, read with a jitter
 SAME_FOCAL = 1e-3  # share; a zoom measured anew in each frame is the same zoom
@@ -68,10 +70,26 @@ class Sights:
     def __len__(self) -> int:
         return len(self.rays)
 
+    @cached_property
+    def by_sides(self) -> Array:
+        """What turns corners' errors (g, 8) in `noise` into as many that are independent: those of the sides.
+
+        A corner is where two fitted lines cross: what it is off along one of them is in the next corner too, and how
+        large a marker seems, which tells its distance, is known better than eight independent numbers would tell.
+        """
+        along = np.roll(self.rays, -1, axis=1) - self.rays
+        normal = np.stack((along[..., 1], -along[..., 0]), axis=2) / np.linalg.norm(along, axis=2, keepdims=True)
+        sides = np.zeros((len(self), 4, 2, 4, 2))  # of each side, at each node, by each corner's x and y
+        for side in range(4):
+            for node, share in enumerate((0.5 - NODES, 0.5 + NODES)):
+                sides[:, side, node, side] = (1 - share) * normal[:, side] / NODE_NOISE
+                sides[:, side, node, (side + 1) % 4] = share * normal[:, side] / NODE_NOISE
+        return sides.reshape(-1, 8, 8)
+
     def chosen(self, rows: Sequence[int]) -> Sights:
         """Only these."""
         index = np.asarray(rows, int)
-        return Sights(**{name: value[index] for name, value in vars(self).items()})
+        return Sights(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
 def by_place(views: Sequence[View]) -> list[list[int]]:
@@ -136,7 +154,7 @@ def average(corners: Array, enlarged: float = 1.0) -> tuple[Array, float]:
     squares = float((weights[:, None, None] * (corners - centre) ** 2).sum())
     random = (KNOWN_FROM * (RANDOM_PX * enlarged) ** 2 + squares) / (KNOWN_FROM + 8 * (frames - 1))
     side = float(np.linalg.norm(centre[0] - centre[2])) / sqrt(2)
-    fixed = (FIXED_PX * enlarged) ** 2 + FIXED_SHARE**2 * random + (FIXED_SIDES * side) ** 2
+    fixed = (FIXED_PX * enlarged) ** 2 + (FIXED_SIDES * side) ** 2
     return centre, sqrt(random / float(weights.sum()) + fixed)
 
 

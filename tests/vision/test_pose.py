@@ -17,6 +17,8 @@ LENS = pinhole()
 SIZE = 0.14
 HERE = Transform(np.eye(3), np.zeros(3))
 CEILING = Mount((3.05, 2.25, 2.60), yaw_deg=35.0, pan_to_tilt_m=(0.006, 0.078), tilt_to_lens_m=(0.024, 0.004))
+POINTS = 40  # of a side that a line is fitted to
+CORNER_VARIANCE = 6.2  # of a right corner on one axis, over that of one point by their number
 EXACT = 1e-4  # degrees: pan and tilt without noise
 
 
@@ -28,9 +30,18 @@ def before(camera: Transform, seed: int, distance: float, tilt: tuple[float, flo
 
 
 def sighted(camera: Transform, marker: Print, rng: np.random.Generator, noise: float, angle: float = EXACT) -> View:
-    """Its true corners with this noise in pixels."""
-    corners = true_corners(LENS, camera, marker) + rng.normal(0, noise, (4, 2))
-    return View(LENS, camera, corners, SIZE, angle)
+    """Its corners with this noise in pixels."""
+    return View(LENS, camera, fitted(true_corners(LENS, camera, marker), rng, noise), SIZE, angle)
+
+
+def fitted(square: np.ndarray, rng: np.random.Generator, noise: float) -> np.ndarray:
+    """Its corners as they are found: where lines cross that are fitted to noisy points of the sides."""
+    share = np.linspace(0.12, 0.88, POINTS)
+    along = np.roll(square, -1, axis=0) - square
+    normal = np.column_stack((along[:, 1], -along[:, 0])) / np.linalg.norm(along, axis=1)[:, None]
+    slope, start = np.polyfit(share, rng.normal(0, noise * np.sqrt(POINTS / CORNER_VARIANCE), (POINTS, 4)), 1)
+    here = np.stack((np.roll(normal, 1, axis=0), normal), axis=1)  # of the two sides that meet in a corner
+    return square + np.linalg.solve(here, np.column_stack((np.roll(start + slope, 1), start))[..., None])[..., 0]
 
 
 def photographed(camera: Transform, marker: Print, seed: int, **kwargs) -> View:
@@ -159,7 +170,8 @@ def test_covariance_is_honest_with_noisy_angles_at_several_places():
         views = []
         for pan, tilt in readings:
             truly = camera_in_apartment(CEILING, pan + rng.normal(0, 0.05), tilt + rng.normal(0, 0.05))
-            fixed = rng.normal(0, FIXED_PX, (4, 2))
+            square = true_corners(LENS, truly, marker)
+            fixed = fitted(square, rng, FIXED_PX) - square
             for _ in range(4):
                 view = sighted(truly, marker, rng, RANDOM_PX, 0.05)
                 views.append(
