@@ -14,6 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from services.vision.lens import Lens
+
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
@@ -62,6 +64,19 @@ def refine(grey: Picture, square: Array, modules: int) -> Array | None:
 def refine_many(grey: Picture, squares: Array, modules: int) -> Array:
     """The same for many squares (n, 4, 2) at once, less exactly; NaN where no lines cross."""
     return _refined(grey, squares, modules, *QUICK)
+
+
+def unbent(square: Array, lens: Lens) -> Array:
+    """The corners (4, 2) of a square whose sides `lens` bends, from those that straight lines gave: they cross beside.
+
+    Pixels, in the lens's picture; so far beside as lines do that are fitted to the sides as the lens bends them.
+    """
+    rays = lens.rays(square)
+    share = np.linspace(TRIM, 1 - TRIM, PROFILES[0])[:, None]
+    sides = rays[:, None] + share * (np.roll(rays, -1, axis=0) - rays)[:, None]  # (4, p, 2)
+    bent = lens.project(np.column_stack((sides.reshape(-1, 2), np.ones(4 * len(share))))).reshape(1, 4, -1, 2)
+    crossed = _cross(*_lines(bent[..., 0], bent[..., 1], np.ones(bent.shape[:3]), REWEIGHTINGS))[0]
+    return np.asarray(2 * square - crossed, float)
 
 
 def _refined(grey: Picture, squares: Array, modules: int, rounds: int, profiles: int, reweightings: int) -> Array:

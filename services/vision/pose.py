@@ -22,7 +22,7 @@ from services.vision.views import Sights, View, by_place, gather
 
 Array = NDArray[np.float64]
 
-GATE = 16.3  # squared distance of two places in variances, beyond which they are two: 1 in 1000 of three numbers
+GATE = 28.0  # squared distance of two places in variances, beyond which they are two: 4 in a million of normal errors
 DOUBTED_DEG = 0.1  # readings are taken to be no better than that when two places are compared
 MISTAKEN, CONFIRMED = 1, 3  # so few views that contradict so many are a mistake
 

@@ -14,14 +14,15 @@ from math import asin, degrees, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from services.vision.corners import unbent
 from services.vision.frames import Transform
 from services.vision.lens import Lens
 
 Array = NDArray[np.float64]
 
 RANDOM_PX = 0.02  # corner noise per axis of one frame, new in each, where their own scatter does not tell
-FIXED_PX = 0.019  # and what all frames of a place share: the pixel grid, the lens calibration; measured, however noisy
-FIXED_SIDES = 0.0003  # of the marker's side, shared too: what the lens bends, paper and print
+FIXED_PX = 0.0125  # and what all frames of a place share, however noisy they are: the pixel grid
+BLOOM_PX = 0.004  # shared by all sides too: how far a dark square seems larger or smaller than it is
 NODES = 0.219  # of a side, from its middle: in two such places is a line, fitted to 0.76 of a side, off independently,
 NODE_NOISE = 0.568  # by this share of what a corner is off, in which two such lines cross
 KNOWN_FROM = 8.0  # numbers that RANDOM_PX counts as against the frames' own scatter
@@ -40,7 +41,8 @@ class View:
     `size_m` is the side of the printed black square, `angle_noise_deg` how well the readings are known of pan and tilt,
     which turn about `axes` (2, 3) in the apartment; None: about any. `focal_doubt` is the standard deviation of the
     lens's focal length as a share of it, `aside_deg` that of its axis in any direction. A picture that was `enlarged`,
-    or is less exact for another reason, has coarser corners by that factor.
+    or is less exact for another reason, has coarser corners by that factor. All its sides may seem outwards or inwards
+    alike, by `bloom_px`.
     """
 
     lens: Lens
@@ -51,6 +53,7 @@ class View:
     focal_doubt: float = 0.0
     aside_deg: float = 0.0
     enlarged: float = 1.0
+    bloom_px: float = BLOOM_PX
     axes: Array | None = None
     at: float = 0.0
 
@@ -64,6 +67,7 @@ class Sights:
     lens_at: Array  # (g, 3), m
     size: Array  # (g,), m
     noise: Array  # (g,), rad, of a corner
+    bloom: Array  # (g,), rad, of all sides alike
     swing: Array  # (g, 3, 3), rad: columns are turns of the camera, in its own frame, of one standard deviation each
     focal_doubt: Array  # (g,), share
 
@@ -75,7 +79,8 @@ class Sights:
         """What turns corners' errors (g, 8) in `noise` into as many that are independent: those of the sides.
 
         A corner is where two fitted lines cross: what it is off along one of them is in the next corner too, and how
-        large a marker seems, which tells its distance, is known better than eight independent numbers would tell.
+        large a marker seems, which tells its distance, is known better than eight independent numbers would tell, as
+        far as its sides are not off alike.
         """
         along = np.roll(self.rays, -1, axis=1) - self.rays
         normal = np.stack((along[..., 1], -along[..., 0]), axis=2) / np.linalg.norm(along, axis=2, keepdims=True)
@@ -84,7 +89,8 @@ class Sights:
             for node, share in enumerate((0.5 - NODES, 0.5 + NODES)):
                 sides[:, side, node, side] = (1 - share) * normal[:, side] / NODE_NOISE
                 sides[:, side, node, (side + 1) % 4] = share * normal[:, side] / NODE_NOISE
-        return sides.reshape(-1, 8, 8)
+        alike = 1 - 1 / np.sqrt(1 + 8 * (self.bloom / (NODE_NOISE * self.noise)) ** 2)
+        return (np.eye(8) - alike[:, None, None] / 8) @ sides.reshape(-1, 8, 8)
 
     def chosen(self, rows: Sequence[int]) -> Sights:
         """Only these."""
@@ -112,11 +118,14 @@ def gather(places: Sequence[Sequence[View]]) -> Sights:
     averaged = [average(np.array([view.corners for view in p], float), p[0].enlarged) for p in places]
     looking = [_mean(np.array([view.camera.rotation for view in place])) for place in places]
     return Sights(
-        rays=np.array([v.lens.rays(c) for v, (c, _) in zip(first, averaged, strict=True)]).reshape(-1, 4, 2),
+        rays=np.array([v.lens.rays(unbent(c, v.lens)) for v, (c, _) in zip(first, averaged, strict=True)]).reshape(
+            -1, 4, 2
+        ),
         rotation=np.array(looking).reshape(-1, 3, 3),
         lens_at=np.array([v.camera.translation for v in first]).reshape(-1, 3),
         size=np.array([v.size_m for v in first], float),
         noise=np.array([n / v.lens.focal for v, (_, n) in zip(first, averaged, strict=True)], float),
+        bloom=np.array([v.bloom_px / v.lens.focal for v in first], float),
         swing=np.array([_swing(v, turned) for v, turned in zip(first, looking, strict=True)]).reshape(-1, 3, 3),
         focal_doubt=np.array([v.focal_doubt for v in first], float),
     )
@@ -124,8 +133,8 @@ def gather(places: Sequence[Sequence[View]]) -> Sights:
 
 def _clearest(place: Sequence[View]) -> list[View]:
     """Without those whose corners are known to be much coarser than of others from there."""
-    best = min(view.enlarged for view in place)
-    return [view for view in place if view.enlarged < COARSER * best]
+    coarse = [max(view.enlarged, view.bloom_px / BLOOM_PX) for view in place]
+    return [view for view, factor in zip(place, coarse, strict=True) if factor < COARSER * min(coarse)]
 
 
 def _swing(view: View, rotation: Array) -> Array:
@@ -153,9 +162,7 @@ def average(corners: Array, enlarged: float = 1.0) -> tuple[Array, float]:
         centre = corners.mean(axis=0)
     squares = float((weights[:, None, None] * (corners - centre) ** 2).sum())
     random = (KNOWN_FROM * (RANDOM_PX * enlarged) ** 2 + squares) / (KNOWN_FROM + 8 * (frames - 1))
-    side = float(np.linalg.norm(centre[0] - centre[2])) / sqrt(2)
-    fixed = (FIXED_PX * enlarged) ** 2 + (FIXED_SIDES * side) ** 2
-    return centre, sqrt(random / float(weights.sum()) + fixed)
+    return centre, sqrt(random / float(weights.sum()) + (FIXED_PX * enlarged) ** 2)
 
 
 def turned_deg(one: Array, other: Array) -> float:

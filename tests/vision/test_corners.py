@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from services.vision.corners import refine, sample
+from services.vision.corners import refine, sample, unbent
 from services.vision.frames import Transform
+from services.vision.lens import Lens
 from tests.vision.rendering import Print, facing, picture, pinhole, true_corners
 
 CAMERA = Transform(np.eye(3), np.zeros(3))
@@ -72,6 +73,22 @@ def test_edges_of_a_few_grey_levels_are_enough(seed: int) -> None:
     found = refine(faint, truth + np.random.default_rng(seed).uniform(-0.7, 0.7, (4, 2)), 7)
     assert found is not None
     assert mean_error(found, truth) < 0.5
+
+
+def test_where_the_lens_bends_the_sides_corners_are_put_right() -> None:
+    lens = Lens(320, 240, np.array([[180.0, 0, 40], [0, 180, 30], [0, 0, 1]]), np.array([-0.2, 0.03, 0, 0, 0]))
+    plain, right = [], []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        place = np.array([rng.uniform(0.8, 1.0), rng.uniform(0.5, 0.7), 1.0]) * 0.35
+        marker = Print(582, "DICT_5X5_1000", 0.14, facing(rng, place, rng.uniform(0, 30)))
+        image, truth = picture(lens, CAMERA, [marker], rng), true_corners(lens, CAMERA, marker)
+        found = refine(image, truth, 7)
+        assert found is not None
+        plain.append(mean_error(found, truth))
+        right.append(mean_error(unbent(found, lens), truth))
+    assert np.mean(plain) > 0.5
+    assert np.mean(right) < 0.1
 
 
 def cut_off(seed: int, edge: int) -> tuple[np.ndarray, np.ndarray]:

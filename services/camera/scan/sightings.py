@@ -18,12 +18,14 @@ from services.vision.frames import Array, Kind, Mount, axes_in_apartment, camera
 from services.vision.lens import Lens
 from services.vision.pose import Located, View, locate_each
 from services.vision.prior import Prior
+from services.vision.views import BLOOM_PX
 from services.vision.zoom import WIDEST, Level, Magnification, at_level
 
 LEAST_TIMES = 1.1  # what a zoom magnifies by at least, of which that is not known
 MOST_SLACK_DEG = 3.0
 HALF_HEIGHT = 9 / 16  # over the focal length, of a lens that is not known: about 90 degrees wide
-COARSE = 6.0  # times the noise of corners: cut-off light moves all edges by 0.03 to 0.09 px, the picture's edge by 0.08
+CUT_OFF_PX = 0.06  # all sides seem 0.03 to 0.09 px outwards or inwards where light is cut off
+AT_EDGE = 6.0  # times the noise of corners where the picture's edge cuts the marker: 0.08 px
 WELL_KNOWN = 0.01  # share of the magnification's uncertainty above which no distance is told: 5 cm at 5 m
 
 
@@ -42,11 +44,6 @@ class Sighting:
     size: tuple[int, int]
     magnified: Magnification | None = None
     cut_off: bool = False
-
-    @property
-    def coarse(self) -> bool:
-        """Whether its corners are less exact than others: its light is cut off, or itself by the picture's edge."""
-        return self.cut_off or not self.detection.whole(*self.size)
 
     @property
     def off_centre(self) -> float:
@@ -177,6 +174,7 @@ def _hung(located: Located, mount: Mount, doubt: Array | None) -> Located:
 
 def _view(eye: Eye, lens: Lens, mount: Mount, sought: Sought, sighting: Sighting, magnified: Magnification) -> View:
     reading, zoomed = sighting.reading, magnified.through(lens.scaled(*sighting.size))
+    times, size = max(1.0, magnified.times), sighting.size
     return View(
         lens=zoomed,
         camera=camera_in_apartment(mount, reading.pan, reading.tilt),
@@ -185,7 +183,8 @@ def _view(eye: Eye, lens: Lens, mount: Mount, sought: Sought, sighting: Sighting
         angle_noise_deg=eye.angle_noise_deg,
         focal_doubt=magnified.relative,
         aside_deg=degrees(magnified.aside * zoomed.width / zoomed.focal),
-        enlarged=max(1.0, magnified.times) * (COARSE if sighting.coarse else 1.0),
+        enlarged=times * (1.0 if sighting.detection.whole(*size) else AT_EDGE),
+        bloom_px=times * (CUT_OFF_PX if sighting.cut_off else BLOOM_PX),
         axes=axes_in_apartment(mount, reading.pan, reading.tilt),
         at=sighting.at,
     )
