@@ -28,7 +28,7 @@ def camera() -> Iterator[simulated.Simulated]:
 @pytest.fixture
 def here(tmp_path: Path, camera: simulated.Simulated) -> Iterator[Bench]:
     with bench(tmp_path, camera, **QUICK) as running:
-        running.until(lambda: running.service.motion.signs > 0 and motion(running) == 0, 10)
+        running.until(lambda: running.service.motion.fact == "attached" and motion(running) == 0, 10)
         yield running
 
 

@@ -178,6 +178,14 @@ def test_firmware_without_heartbeat_is_asked_instead() -> None:
     assert room.values[-1] == -1
 
 
+def test_the_diagnostics_tell_whether_silence_would_prove_anything() -> None:
+    room = Room().attached()
+    room.hear(START)
+    assert room.watch.fact == "attached, no heartbeat yet"
+    room.hear(BEAT)
+    assert room.watch.fact == "attached"
+
+
 def test_nothing_is_said_before_anything_is_known_but_not_for_long() -> None:
     room = Room()
     room.run(5)

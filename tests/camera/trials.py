@@ -205,9 +205,10 @@ def alarm_in_trouble(bus: Client) -> bool:
 
 
 def met(bus: Client) -> bool:
-    """Whether the camera has said who it is."""
+    """Whether the camera has said who it is, and its alarm has given a sign of life: only then silence is a fault."""
     said = newest(bus, "diagnostics/camera/ip1")
-    return bool(said) and bool(json.loads(said)["values"]["firmware"])
+    values = json.loads(said)["values"] if said else {}
+    return bool(values.get("firmware")) and values.get("alarm") == "attached"
 
 
 def slow_answers(bus: Client) -> bool:
@@ -270,7 +271,7 @@ def fault(flat: SmallFlat, which: Fault, *, camera: str = "ip1") -> float:
     door, service = flat.doors[camera], flat.pid(f"camera-{camera}")
     with flat.client(f"camera/{camera}/#", f"diagnostics/camera/{camera}") as bus:
         bus.payload(f"camera/{camera}/motion", lambda motion: motion.value != -1, 20.0)
-        wait(bus, lambda: met(bus), 20.0, "the camera to have said who it is")
+        wait(bus, lambda: met(bus), 20.0, "the camera to have said who it is, and its alarm that it lives")
         began = time.monotonic()
         door.tell("fault", name=which.name, **which.settings)
         if which.also:

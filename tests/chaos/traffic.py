@@ -1,4 +1,7 @@
-"""What people do meanwhile: orders, commands, questions and missions, drawn from a seed. Nobody waits for answers."""
+"""What people do meanwhile: orders, commands, questions and missions, drawn from a seed. Nobody waits for answers.
+
+Orders of the camera are heard until all is over, whoever gives them.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,7 @@ class Traffic:
     motor: Motor
     seed: int
     said: dict[str, int] = field(default_factory=dict)
+    _quiet: threading.Event = field(default_factory=threading.Event)
     _stop: threading.Event = field(default_factory=threading.Event)
 
     def __enter__(self) -> Traffic:
@@ -32,18 +36,19 @@ class Traffic:
         return self
 
     def stop(self) -> None:
-        """Nothing more is wanted; and what was is called off."""
-        self._stop.set()
-        self._thread.join(20)
+        """Nothing more is said; a mission that is under way still gives orders, so they are heard on."""
+        self._quiet.set()
 
     def __exit__(self, *_: object) -> None:
-        self.stop()
+        self._stop.set()
+        self._thread.join(20)
 
     def _run(self) -> None:
         rng, numbers = random.Random(self.seed), itertools.count()
         with connected(self.whole.bus, HEARD) as bus:
             while not self._stop.is_set():
-                self._say(bus, rng, f"chaos-{next(numbers)}")
+                if not self._quiet.is_set():
+                    self._say(bus, rng, f"chaos-{next(numbers)}")
                 bus.collect(rng.uniform(*EVERY_S))
                 self.motor.hears(bus)
 

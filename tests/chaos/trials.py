@@ -48,10 +48,9 @@ def chaos(running: Whole, seed: int, seconds: float) -> float:
     vitals, log_begins = Vitals(), running.flat.log.stat().st_size
     log.warning("seed %d: %d faults in %.0f s", seed, len(plan), seconds)
     with Publisher(running.parts.broker_port, NUMBERED, RATE, BURST) as publisher:
-        with Motor(running) as motor:
-            with Traffic(running, motor, seed) as traffic:
-                last = _strike(running, plan, vitals, motor)
-                traffic.stop()
+        with Motor(running) as motor, Traffic(running, motor, seed) as traffic:
+            last = _strike(running, plan, vitals, motor)
+            traffic.stop()
             slow = slowness()
             green_s = seconds_until_green(running, last, GREEN_S * slow)
             call_off(running)

@@ -44,6 +44,7 @@ class MotionWatch:
         self.signs = 0  # events and heartbeats
         self._attached = False
         self._mute = self._silent = False
+        self._beats = False  # a heartbeat has come: from now on silence proves something
         self._trouble_at: float | None = None  # when to say so; None: there is none
         self._why = "not attached yet"
         self._active = False  # the camera has told no end of it
@@ -59,7 +60,9 @@ class MotionWatch:
             return "off"
         if self._mute:
             return "asked every few seconds: this firmware has no heartbeat"
-        return "attached" if self._attached else f"lost: {self._why}"
+        if not self._attached:
+            return f"lost: {self._why}"
+        return "attached" if self._beats else "attached, no heartbeat yet"
 
     @property
     def trouble(self) -> bool:
@@ -71,6 +74,7 @@ class MotionWatch:
         self.signs += len(heard.events)
         if heard.events:
             self._mute = self._silent = False
+            self._beats |= any(not event.code for event in heard.events)
         if heard.attached:
             self._attached, self._asked_at = True, NEVER
         if self._attached and not self._silent:
