@@ -9,7 +9,8 @@ from uuid import uuid4
 
 from services import topics
 from services.bus import Message
-from services.camera.orders import Command
+from services.camera.orders import Command, canonical
+from services.errors import BadMessage
 from services.payloads import FINAL, OrderResult, OrderState, Position, Who
 
 
@@ -66,3 +67,16 @@ class Answers:
         answer = topics.reply(message, job.message)
         if answer is not None:
             self.publish(answer)
+
+    def refuse(self, message: Message, error: BadMessage) -> None:
+        """An order that cannot be taken is answered all the same, with its own id where it could be read."""
+        row, levels = topics.find(message.topic)
+        wanted = error.read.payload if isinstance(error, topics.LateCommand) else None
+        if row is topics.CAMERA_ORDER:
+            key, value = canonical(levels["key"]), wanted.value if wanted else ""
+        elif row is topics.CAMERA_POSITION_SET:
+            key, value = "Position", wanted.model_dump(exclude={"id", "by"}, exclude_none=True) if wanted else {}
+        else:
+            return
+        refused = job(key, value, wanted.by if wanted else "human", wanted.id if wanted else None, message)
+        self.tell(refused, "refused", str(error))

@@ -22,6 +22,7 @@ from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.commands import VideoMode
 from services.camera.device import REPLY, Sender
 from services.camera.discovery import Discovery
+from services.camera.early import Early
 from services.camera.health import IDLE_S, Health
 from services.camera.orders import Command, GotoPlace, LookAt
 from services.camera.places import Places
@@ -42,6 +43,7 @@ from services.errors import BadMessage
 from services.payloads import Order, OrderState, PositionSet, ScanResult
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
+BROKER_LOST = "the connection to the broker was lost"
 STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
 
 
@@ -84,6 +86,7 @@ class CameraService:
         self.bulletin.diagnostics = config.diagnostics
         self.discovery = Discovery(config.name, publish, on=config.discovery)
         self.answers = Answers(config.name, publish, self.bulletin.position)
+        self.early = Early(self.answers)
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
         self.trips = Trips(config, self.bulletin, self.places)
@@ -109,30 +112,18 @@ class CameraService:
         elif message.topic == ANALYSED and isinstance(message.value, Analysed):
             self.scanner.take(message.value)
         elif message.topic == LOST_TOPIC:  # nobody could end a motion any more
-            self.motors.give_up("the connection to the broker was lost", now)
+            self.early.call_off(BROKER_LOST)
+            self.motors.give_up(BROKER_LOST, now)
         elif message.topic == ASKED:
             self.stage.begin(self.feed.shown(), now, _nobody)
         else:
             try:
                 read = topics.read(message, now)
             except BadMessage as error:
-                self._refuse(message, error)
+                self.answers.refuse(message, error)
                 raise
             self._read(read, now)
         return self._flush()
-
-    def _refuse(self, message: Message, error: BadMessage) -> None:
-        """An order that cannot be taken is answered all the same, with its own id where it could be read."""
-        row, levels = topics.find(message.topic)
-        wanted = error.read.payload if isinstance(error, topics.LateCommand) else None
-        if row is topics.CAMERA_ORDER:
-            key, value = orders.canonical(levels["key"]), wanted.value if wanted else ""
-        elif row is topics.CAMERA_POSITION_SET:
-            key, value = "Position", wanted.model_dump(exclude={"id", "by"}, exclude_none=True) if wanted else {}
-        else:
-            return
-        job = life.job(key, value, wanted.by if wanted else "human", wanted.id if wanted else None, message)
-        self.answers.tell(job, "refused", str(error))
 
     def tick(self, now: float) -> Iterable[Message]:
         """Wakes the plans, and publishes what has changed."""
@@ -140,6 +131,7 @@ class CameraService:
             self._polling = True
             for plan in (self._poll(now), self.feed.run(now), self.feed.every_so_often(now), self.upkeep.plan(now)):
                 self.stage.begin(plan, now, _nobody)
+        self.early.tick(now)
         self.stage.tick(now)
         self.motors.tick(now)
         self.health.moving = self.motors.busy
@@ -212,6 +204,7 @@ class CameraService:
             if self.health.online and self.bulletin.still_for(now) > STIRRED_S:
                 self.health.next_poll += REST_S - IDLE_S
             if self.health.online and not met:
+                self.early.waits = True
                 yield from attempt(Identify())
                 self.stage.begin(self.abilities.meet(self.bulletin.identity, now), now, _nobody)
                 now = (yield from attempt(GetPicture())).received
@@ -220,6 +213,8 @@ class CameraService:
                 if self.bulletin.turning:
                     self.motors.make_sure(now)
             met = self.health.online
+            for job, command in self.early.met(now):
+                self._take(job, command, now)
 
     def _read(self, read: topics.Read, now: float) -> None:
         payload = read.payload
@@ -244,6 +239,10 @@ class CameraService:
 
     def _take(self, job: Job, command: Command, now: float) -> None:
         job.command = command
+        free = isinstance(command, WITHOUT_CAMERA | orders.Halt) and not isinstance(command, orders.Broadcast)
+        if self.early.waits and not free:
+            self.early.keep(job, command)
+            return
         try:
             self._check(command)
         except Refused as error:
@@ -254,6 +253,7 @@ class CameraService:
             self.answers.tell(job, "running")
             self.answers.tell(job, "done")
         elif isinstance(command, orders.Halt | orders.EndScan):
+            self.early.call_off(f"stopped by the order {job.key}")
             self.motors.halt(job, now)
         elif isinstance(command, orders.Motor):
             self.motors.order(job, now)

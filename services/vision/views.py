@@ -116,11 +116,10 @@ def gather(places: Sequence[Sequence[View]]) -> Sights:
     places = [_clearest(place) for place in places]
     first = [place[0] for place in places]
     averaged = [average(np.array([view.corners for view in p], float), p[0].enlarged) for p in places]
+    rays = [v.lens.rays(unbent(corners, v.lens)) for v, (corners, _) in zip(first, averaged, strict=True)]
     looking = [_mean(np.array([view.camera.rotation for view in place])) for place in places]
     return Sights(
-        rays=np.array([v.lens.rays(unbent(c, v.lens)) for v, (c, _) in zip(first, averaged, strict=True)]).reshape(
-            -1, 4, 2
-        ),
+        rays=np.array(rays).reshape(-1, 4, 2),
         rotation=np.array(looking).reshape(-1, 3, 3),
         lens_at=np.array([v.camera.translation for v in first]).reshape(-1, 3),
         size=np.array([v.size_m for v in first], float),

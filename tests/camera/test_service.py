@@ -286,6 +286,55 @@ def test_orders_are_refused_while_the_camera_is_away_and_it_is_asked_ever_less_o
     assert 5 <= flat.service.counters["requests"] - before <= 12
 
 
+@pytest.fixture
+def just_started(tmp_path: Path) -> Flat:
+    (tmp_path / "preset_position.yaml").write_text(POSITIONS)
+    (tmp_path / "preset_coords.yaml").write_text(PRESETS)
+    return Flat(tmp_path, places=Path())
+
+
+def test_an_order_before_the_camera_was_met_waits_for_that(just_started: Flat) -> None:
+    just_started.order("Goto", "Sofa", order_id="before")
+    just_started.order("Goto", "Kitchen")
+    assert just_started.states() == []
+    just_started.until(just_started.started)
+    assert just_started.service.bulletin.identity.serial
+    just_started.until(just_started.ended)
+    assert just_started.states() == LIFE
+    assert just_started.states("before")[-1] == "cancelled"
+    assert abs(just_started.reading.pan - 41.1) <= 0.5
+
+
+def test_an_order_to_a_camera_that_is_not_there_is_refused_as_soon_as_that_is_known(just_started: Flat) -> None:
+    just_started.camera.away = Away("no answer from the camera")
+    just_started.order("Goto", "Kitchen")
+    just_started.until(just_started.ended, 2.0)
+    assert just_started.states() == ["refused"]
+    assert "the camera is offline: no answer" in just_started.last()["error"]
+
+
+def test_an_order_waits_five_seconds_for_the_camera_and_is_then_as_late_as_any_other(just_started: Flat) -> None:
+    just_started.motors.latency = 30.0
+    just_started.order("SetTarget", "17", order_id="own")
+    just_started.order("Goto", "Kitchen")
+    assert just_started.states("own") == LIFE
+    just_started.until(just_started.ended, 6.5)
+    assert just_started.states() == ["refused"]
+    assert "s old (limit 5)" in just_started.last()["error"]
+    just_started.run(200)
+    assert not just_started.started()
+
+
+def test_a_stop_before_the_camera_was_met_goes_first_and_calls_off_what_waits(just_started: Flat) -> None:
+    just_started.order("Goto", "Kitchen")
+    just_started.order("Move", "Stop", order_id="stop")
+    assert just_started.states() == ["cancelled"]
+    just_started.until(lambda: just_started.ended("stop"))
+    assert just_started.states("stop") == LIFE
+    just_started.run(10)
+    assert not just_started.started()
+
+
 def test_a_wrong_password_is_tried_once_and_then_left_alone(flat: Flat) -> None:
     flat.camera.away = BadLogin("the camera does not accept this user and password")
     flat.run(3)

@@ -21,10 +21,7 @@ TAIL_S = 1.0  # an answer may always come so much later than usual: busy Wi-Fi d
 TAIL_PART = 3.3  # of the usual time, where that is long
 FORGETS, WORSE = 0.998, 1.2  # of the latest answer: kept with each one more; and it may be later the next time
 SOONER_S, LATER_S, MOST_LATE_S = 0.008, 0.04, 0.5
-NEAR_DEG, NEARER_DEG = (
-    0.42,
-    0.35,
-)  # a reading as near as that has arrived: 0.5 promised, resolution and dither taken off
+NEAR_DEG, NEARER_DEG = 0.42, 0.35  # a reading so near has arrived: 0.5 promised, resolution and dither taken off
 STILL_DEG = 0.05
 STEADY = 6  # readings at rest that were alike show that they do not dither
 GRIDS = (2.0, 1.0)  # some firmware tells zoom in coarse steps
