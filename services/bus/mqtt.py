@@ -30,6 +30,7 @@ log = logging.getLogger(__name__)
 
 RETRY_S = (0.1, 1.0)  # between attempts to connect: first, longest; a restarted broker is met again within 2 s
 FAREWELL_S = 2.0
+DENIALS = 100  # topics that are told as denied, at most
 LOOK_S = 0.01  # between two looks whether the last words are said
 WAKE = Message(WAKE_TOPIC)
 
@@ -65,6 +66,7 @@ class MqttBus:
         self._closing = threading.Event()
         self._lost = threading.Event()
         self._told = ""
+        self._denied: set[str] = set()  # topics; told once each
         self._keeper = threading.Thread(target=self._keep_connected, name="bus", daemon=True)
         self._keeper.start()
 
@@ -244,6 +246,7 @@ class MqttBus:
         client.on_disconnect = self._on_disconnect  # type: ignore[assignment]
         client.on_came = self._on_came
         client.on_acknowledged = self._acknowledged.append
+        client.on_denied = self._on_denied
         client.on_granted = lambda: self._inbox.put(WAKE)
         return client
 
@@ -279,6 +282,11 @@ class MqttBus:
             if was_up and LOST_TOPIC in self._filters:
                 self.post(Message(LOST_TOPIC))
         self._lost.set()
+
+    def _on_denied(self, topic: str, why: str) -> None:
+        if topic not in self._denied and len(self._denied) < DENIALS:
+            self._denied.add(topic)
+            log.warning("the broker takes nothing for %s from %s: %s", topic, self.address.client_id, why)
 
     def _on_came(self, message: Message) -> None:
         if message.retain and not any(topic_matches(wanted, message.topic) for wanted in self._filters):

@@ -29,17 +29,20 @@ WRITTEN_AT_ONCE = 64 * 1024
 KEEPALIVE_EVERY_S = 1.0  # how often paho looks at its clock, at least
 PUBACK = struct.Struct(">HH")
 PUBACK_HEAD = MessageType.PUBACK << 8 | 2  # its first two bytes: the type, and that two more follow (MQTT 3.1.1, 3.4)
+FAILURE, NOT_AUTHORIZED = 0x80, 0x87  # reasons in a PUBACK (MQTT 5, 3.4.2.1); 3.1.1 has none
 
 
 class Client(paho.Client):
     """paho's client with a faster way in and out: most of its time goes into `on_message` and `on_publish`.
 
-    `on_came` is given each message, `on_acknowledged` the packet ids of ours that the broker has, and `on_granted` is
-    called when it has taken in a subscription. `number` is told with each message: which connection it came by.
+    `on_came` is given each message, `on_acknowledged` the packet ids of ours that the broker has, `on_denied` the topic
+    of one that it threw away and why, and `on_granted` is called when it has taken in a subscription. `number` is told
+    with each message: which connection it came by.
     """
 
     on_came: Callable[[Message], None]
     on_acknowledged: Callable[[int], None]
+    on_denied: Callable[[str, str], None]
     on_granted: Callable[[], None]
     clock: Callable[[], float]
     number = 0
@@ -64,7 +67,7 @@ class Client(paho.Client):
     def forget(self) -> None:
         """Whom it tells. Its socket is closed when nobody holds it; in a circle that would be left to chance."""
         self.on_connect = self.on_disconnect = None
-        self.on_came = self.on_acknowledged = self.on_granted = _nobody
+        self.on_came = self.on_acknowledged = self.on_denied = self.on_granted = _nobody
 
     def ack_all(self, packets: Iterable[int]) -> None:
         """Acknowledges messages with QoS 1, by their packet ids, in one piece."""
@@ -144,10 +147,14 @@ class Client(paho.Client):
         self.on_granted()
 
     def _handle_pubackcomp(self, cmd: Any) -> MQTTErrorCode:
-        packet = int.from_bytes(self._in_packet["packet"][:2], "big")
+        data = self._in_packet["packet"]
+        packet = int.from_bytes(data[:2], "big")
         with self._out_message_mutex:
             if packet not in self._out_messages:
                 return MQTTErrorCode.MQTT_ERR_SUCCESS
+            if len(data) > 2 and data[2] >= FAILURE:
+                why = "not authorized" if data[2] == NOT_AUTHORIZED else f"reason {data[2]:#x}"
+                self.on_denied(self._out_messages[packet].topic, why)
             self.on_acknowledged(packet)
             return self._do_on_publish(packet, None, None)  # type: ignore[arg-type]  # for `on_publish`, which is none
 

@@ -111,7 +111,8 @@ def kill_broker(flat: SmallFlat, *, camera: str = "ip1") -> float:
     with flat.without_broker(signal.SIGKILL):
         seconds = until_still(door)
         rests(door)
-    with flat.client(f"camera/{camera}/#") as bus:
+    with flat.client(f"camera/{camera}/#", f"diagnostics/camera/{camera}") as bus:
+        speaks(bus, camera)
         bus.payload(f"camera/{camera}/status", lambda status: status.state == "online", 20.0)
         takes_orders(bus, camera)
     return seconds
@@ -143,6 +144,12 @@ def cut_network(flat: SmallFlat, *, camera: str = "ip1", seconds: float = 0.0) -
         takes_orders(bus, camera)
     assert "action=stop" in first["target"], f"the first request was {first['target']}"
     return float(first["time"]) - back
+
+
+def speaks(bus: Client, camera: str) -> None:
+    """A camera's service is there: what a broker kept over its death says nothing about that, what is new does."""
+    topic = f"diagnostics/camera/{camera}"
+    bus.until(lambda message: message.topic == topic and not message.retain, 20.0, "the service to say something new")
 
 
 def takes_orders(bus: Client, camera: str) -> None:

@@ -11,7 +11,7 @@ import socket
 import ssl
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -21,6 +21,9 @@ import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 
 from services import access
+from services.bus import Message
+from services.bus.connection import Address
+from services.bus.mqtt import MqttBus
 from services.credentials import passwords
 from services.credentials.folder import Folder, fill, renew
 from services.peers import answers, free_port, program, running, wait_until
@@ -134,6 +137,21 @@ def test_every_row_has_somebody_who_writes_and_somebody_who_reads() -> None:
     assert not [case.topic for case in CASES if not somebody(case, case.row.writers)]
     assert not [case.topic for case in CASES if not somebody(case, case.row.readers)]
     assert {"dashboard", "hubs", "robot", "history", "mission", "operator", "camera-ip2"} <= set(ACCOUNTS)
+
+
+def test_a_service_tells_once_which_answer_the_broker_does_not_take_from_it(
+    broker: Broker, caplog: pytest.LogCaptureFixture
+) -> None:
+    camera = Address("camera-ip1", port=broker.port, user="camera-ip1", password=broker.secrets["camera-ip1"])
+    with mouth(broker, OBSERVER) as observer, closing(MqttBus(camera)) as bus:
+        observer.listen("reply/#", "desk/#")
+        wait_until(lambda: bool(bus.receive(0.01) or bus.connected), "the service is let in", LIMIT_S)
+        for topic in ("desk/answer", "desk/answer", "reply/desk"):
+            bus.publish(Message(topic, b"done", qos=1))
+        wait_until(lambda: bool(bus.receive(0.01) or observer.came), "the answer that is taken", LIMIT_S)
+    assert [topic for topic, _, _ in observer.came] == ["reply/desk"]
+    told = [record.getMessage() for record in caplog.records if "desk/answer" in record.getMessage()]
+    assert told == ["the broker takes nothing for desk/answer from camera-ip1: not authorized"]
 
 
 def test_every_account_writes_what_the_table_says_and_nothing_else(broker: Broker) -> None:
