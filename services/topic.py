@@ -18,6 +18,12 @@ from services.errors import BadMessage
 STALE_AFTER_S = 5.0  # contract section 2: an older command is refused
 
 
+def lateness(received: float, now: float) -> str | None:
+    """How late a command that came at `received` is, in words; None: it is not. Both in seconds since 1970."""
+    late = now - received
+    return f"{late:.1f} s old (limit {STALE_AFTER_S:.0f})" if late > STALE_AFTER_S else None
+
+
 class Kind(Enum):
     """What a topic is for; it alone decides retain, QoS and expiry."""
 

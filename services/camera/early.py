@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from services.camera.answers import Answers, Job
 from services.camera.orders import Command
-from services.topic import STALE_AFTER_S
+from services.topic import lateness
 
 
 class Early:
@@ -32,9 +32,8 @@ class Early:
     def tick(self, now: float) -> None:
         """Refuses those that have become too old."""
         for job, _ in self._jobs:
-            if (age := now - job.message.received) > STALE_AFTER_S:
-                why = f"{age:.1f} s old (limit {STALE_AFTER_S:.0f}): the camera was not met so soon"
-                self.answers.tell(job, "refused", why)
+            if late := lateness(job.message.received, now):
+                self.answers.tell(job, "refused", f"{late}: the camera was not met so soon")
         self._jobs = [(job, command) for job, command in self._jobs if not job.ended]
 
     def met(self, now: float) -> list[tuple[Job, Command]]:

@@ -44,6 +44,8 @@ from services.payloads import Order, OrderState, PositionSet, ScanResult
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
 BROKER_LOST = "the connection to the broker was lost"
+FREE = WITHOUT_CAMERA | orders.Halt | orders.EndScan  # can be done while the camera is away,
+IN_TURN = orders.Broadcast | orders.EndScan  # these not before what came earlier
 STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
 
 
@@ -239,8 +241,7 @@ class CameraService:
 
     def _take(self, job: Job, command: Command, now: float) -> None:
         job.command = command
-        free = isinstance(command, WITHOUT_CAMERA | orders.Halt) and not isinstance(command, orders.Broadcast)
-        if self.early.waits and not free:
+        if self.early.waits and (isinstance(command, IN_TURN) or not isinstance(command, FREE)):
             self.early.keep(job, command)
             return
         try:
@@ -271,8 +272,7 @@ class CameraService:
 
     def _check(self, command: Command) -> None:
         """Refused when it can be said before anything is sent that this cannot be done."""
-        free = isinstance(command, WITHOUT_CAMERA | orders.Halt | orders.EndScan)
-        if not free and not self.health.online:
+        if not isinstance(command, FREE) and not self.health.online:
             raise Refused(f"the camera is {self.health.state}: {self.health.reason}")
         if isinstance(command, GotoPlace | LookAt):
             self.trips.goal(command)

@@ -24,7 +24,7 @@ import httpx
 from services.bus import Message
 from services.errors import Unavailable
 from services.runner import Post
-from services.topic import STALE_AFTER_S
+from services.topic import lateness
 
 log = logging.getLogger(__name__)
 STATES, STATE, ANSWER, LOST = "/openhab/states", "/openhab/state", "/openhab/answer", "/openhab/lost"
@@ -143,9 +143,8 @@ class Connection:
 
     def _fault(self, write: Write) -> str | None:
         """Sends one; what is wrong with that, None when OpenHAB took it."""
-        late = time.time() - write.received
-        if late > STALE_AFTER_S:
-            return f"{late:.1f} s old (limit {STALE_AFTER_S:.0f}), not sent"
+        if late := lateness(write.received, time.time()):
+            return f"{late}, not sent"
         path = f"/rest/items/{quote(write.item)}" + ("" if write.command else "/state")
         headers = {"Content-Type": "text/plain; charset=utf-8"}
         try:

@@ -14,9 +14,9 @@ from pydantic import BaseModel, ValidationError
 from services import payloads as p
 from services.bus import Message
 from services.errors import BadMessage
-from services.topic import STALE_AFTER_S
 from services.topic import Kind as Kind
 from services.topic import Topic as Topic
+from services.topic import lateness
 from services.topics import camera, discovery, history, home, mission
 from services.topics.camera import *
 from services.topics.discovery import *
@@ -67,8 +67,8 @@ def read(message: Message, now: float) -> Read:
     if known.topic.kind is Kind.COMMAND:
         if message.retain:
             raise LateCommand(known, "a retained command")
-        if now - message.received > STALE_AFTER_S:
-            raise LateCommand(known, f"{now - message.received:.1f} s old (limit {STALE_AFTER_S:.0f})")
+        if late := lateness(message.received, now):
+            raise LateCommand(known, late)
     return known
 
 

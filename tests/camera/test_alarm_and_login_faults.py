@@ -74,7 +74,7 @@ def test_after_a_password_change_three_logins_fail_at_most_over_everything_toget
     tmp_path: Path, camera: simulated.Simulated
 ) -> None:
     with bench(tmp_path, camera, motion={"heartbeat_s": 1}) as here:
-        here.until(lambda: here.service.motion.signs > 0, 10)
+        here.until(lambda: here.service.motion.fact == "attached", 10)
         here.inbox.put(snapshot())
         here.tell("fault", name="password")
         here.tell("drop")

@@ -54,7 +54,7 @@ def test_a_broken_connection_is_made_again_and_what_was_missed_is_asked_for(here
 
 
 def test_a_camera_that_hangs_is_noticed_and_comes_back_by_itself(here: Bench) -> None:
-    here.until(lambda: here.service.motion.signs > 0, 5)
+    here.until(lambda: here.service.motion.fact == "attached", 5)
     here.tell("freeze", on=True)
     here.until(lambda: value(here) == -1, 10)
     here.tell("freeze", on=False)

@@ -31,9 +31,8 @@ class Room:
     def begin(self, plan: Plan[None], now: float) -> None:
         self.stage.begin(plan, now, lambda run, now: None)
 
-    def hear(self, *events: Event, attached: bool = False, lost: str | None = None, silent: bool = False,
-             mute: bool = False) -> None:  # fmt: skip
-        self.watch.take(Heard(self.now, events, attached, lost, silent, mute))
+    def hear(self, *events: Event, attached: bool = False, lost: str | None = None, silent: bool = False) -> None:
+        self.watch.take(Heard(self.now, events, attached, lost, silent))
         self.step()
 
     def run(self, seconds: float, events: Sequence[Event] = ()) -> None:
@@ -164,7 +163,7 @@ def test_a_stream_that_fell_silent_is_in_trouble_until_it_gives_a_sign_of_life()
 
 def test_firmware_without_heartbeat_is_asked_instead() -> None:
     room = Room().attached()
-    room.hear(lost="nothing came", silent=True, mute=True)
+    room.hear(lost="nothing came", silent=True)
     room.goes_on = True
     room.run(6)
     assert room.values == [0, 1]

@@ -22,10 +22,15 @@ LIFE = ["accepted", "running", "done"]
 
 
 @pytest.fixture
-def flat(tmp_path: Path) -> Flat:
+def just_started(tmp_path: Path) -> Flat:
     (tmp_path / "preset_position.yaml").write_text(POSITIONS)
     (tmp_path / "preset_coords.yaml").write_text(PRESETS)
-    return Flat(tmp_path, places=Path()).online()
+    return Flat(tmp_path, places=Path())
+
+
+@pytest.fixture
+def flat(just_started: Flat) -> Flat:
+    return just_started.online()
 
 
 def test_goto_is_accepted_runs_and_is_done_when_the_camera_rests_there(flat: Flat) -> None:
@@ -284,13 +289,6 @@ def test_orders_are_refused_while_the_camera_is_away_and_it_is_asked_ever_less_o
     before = flat.service.counters["requests"]
     flat.run(100)
     assert 5 <= flat.service.counters["requests"] - before <= 12
-
-
-@pytest.fixture
-def just_started(tmp_path: Path) -> Flat:
-    (tmp_path / "preset_position.yaml").write_text(POSITIONS)
-    (tmp_path / "preset_coords.yaml").write_text(PRESETS)
-    return Flat(tmp_path, places=Path())
 
 
 def test_an_order_before_the_camera_was_met_waits_for_that(just_started: Flat) -> None:

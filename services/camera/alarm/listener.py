@@ -39,7 +39,7 @@ class Ear(Protocol):
 class Heard:
     """`attached` just now, or `lost` and why, or events that came (a heartbeat is one).
 
-    `silent`: lost because nothing came; `mute`: and nothing ever has.
+    `silent`: lost because nothing came.
     """
 
     at: float
@@ -47,7 +47,6 @@ class Heard:
     attached: bool = False
     lost: str | None = None
     silent: bool = False
-    mute: bool = False
 
 
 class Listener:
@@ -55,7 +54,6 @@ class Listener:
 
     def __init__(self, name: str, ear: Ear, post: Post, clock: Callable[[], float] = time.time) -> None:
         self._ear, self._post, self._clock = ear, post, clock
-        self._signs = 0  # heartbeats since the beginning: some firmware has none
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"{name} events", daemon=True)
         self._thread.start()
@@ -81,8 +79,7 @@ class Listener:
                 lost = str(error)
             if self._closing.is_set():
                 return
-            mute = silent and self._signs == 0
-            self._tell(Heard(self._clock(), lost=lost, silent=silent, mute=mute))
+            self._tell(Heard(self._clock(), lost=lost, silent=silent))
             pause = FIRST_PAUSE_S if self._clock() - began > WELL_S else min(LONGEST_PAUSE_S, 2 * pause)
             self._closing.wait(max(pause, least))
 
@@ -91,7 +88,6 @@ class Listener:
         for events in self._ear.listen():
             if self._closing.is_set():
                 return
-            self._signs += any(not event.code for event in events)
             if events or not attached:
                 self._tell(Heard(self._clock(), tuple(events), attached=not attached))
             attached = True

@@ -41,7 +41,6 @@ class MotionWatch:
         self.on = on
         self.masked = 0  # events that were the camera's own doing
         self.reconnects = 0
-        self.signs = 0  # events and heartbeats
         self._attached = False
         self._mute = self._silent = False
         self._beats = False  # a heartbeat has come: from now on silence proves something
@@ -71,7 +70,6 @@ class MotionWatch:
 
     def take(self, heard: Heard) -> None:
         """What the listener posts."""
-        self.signs += len(heard.events)
         if heard.events:
             self._mute = self._silent = False
             self._beats |= any(not event.code for event in heard.events)
@@ -121,9 +119,9 @@ class MotionWatch:
     def _lose(self, heard: Heard) -> None:
         was, self._attached = self._attached, False
         self.reconnects += was
-        self._mute, self._why = heard.mute, heard.lost or ""
-        self._silent = heard.silent and not heard.mute
-        if heard.mute:
+        self._mute, self._why = heard.silent and not self._beats, heard.lost or ""
+        self._silent = heard.silent and self._beats
+        if self._mute:
             self._trouble_at = None
         elif self._trouble_at is None:
             self._trouble_at = heard.at + (GRACE_S if was and not heard.silent else 0.0)
