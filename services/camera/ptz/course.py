@@ -14,6 +14,7 @@ PAN, TILT, ZOOM = range(3)
 END = 0.15  # degrees or levels: as near as that to an end of its range, an axis may have been stopped by it
 READ_DEG = 0.08  # the resolution, and a little dither
 ZOOM_SLOWS_S = 0.1  # coarse readings do not teach how long zoom takes to stop
+CLEAR_DEG = 2.0  # so far the wrong way is not a doubtful reading
 TIME_S = 0.01  # what is left of the timing of a command or a reading when all that is learnt is taken off
 
 
@@ -82,6 +83,8 @@ class Course:
                 continue
             if axis == ZOOM:
                 self.skill.paces[ZOOM].borrow(self.skill.paces[PAN])
+            else:
+                self._doubt_sense(axis, reply, late, pose[axis])
             self._learn(axis, reply, late, pose[axis])
 
     def _learn(self, axis: int, reply: Reply, late: float, value: float) -> None:
@@ -103,8 +106,18 @@ class Course:
             own, read = timing**2 + 0.05**2, noise**2 + (TIME_S * 2 * speed) ** 2
             self.shift[axis] = (value - model) * own / (own + read)
 
+    def _doubt_sense(self, axis: int, reply: Reply, late: float, value: float) -> None:
+        """An axis that has clearly gone the other way all the time: which way it turns was wrong, or changed."""
+        pace, told = self.skill.paces[axis], self.told[axis]
+        ways = {one.level > 0 for one in told if one.level}
+        expected = pace.travel(told, pace.seen_at(reply.sent, late))
+        moved = value - self.origin[axis]
+        if len(ways) == 1 and expected * moved < 0 and min(abs(expected), abs(moved)) > CLEAR_DEG:
+            self.flip(axis)
+
     def flip(self, axis: int) -> None:
-        """It turned the other way than was thought."""
+        """It turns the other way than was thought."""
+        self.skill.senses[axis].sign *= -1
         self.told[axis][:] = [one._replace(level=-one.level) for one in self.told[axis]]
         self.levels[axis] = -self.levels[axis]
 

@@ -10,14 +10,13 @@ from services.camera.plan import Plan, wait
 from services.camera.ptz import drive as own
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Pose
-from services.camera.ptz.helm import Helm
-from services.camera.ptz.pace import READ_LATE
+from services.camera.ptz.helm import FOREVER, PAIR_S, Helm
 from services.camera.ptz.skill import NEARER_DEG
 from services.camera.requests import Reading, Refused, Reply, Request, Status
 
 MOST_DRIVES = 4  # in one move
 TRY_LEFT = 7  # commands; with fewer nothing new is tried
-LOOKS = 15
+LOOKS = 30  # less and less often
 LONG_S = 2.0  # a drive that takes longer is looked at on the way, which costs no time
 
 
@@ -83,8 +82,9 @@ def at_rest(
     Returns the reading, when it came, and whether it surely shows the camera at rest.
     """
     skill = helm.skill
-    yield from wait(max(now, arrives - skill.paces[PAN].other(READ_LATE) + skill.arrives_late))
+    yield from wait(max(now, arrives - skill.read_late + skill.arrives_late))
     seen: list[Reading] = []
+    before = FOREVER
     for _ in range(LOOKS):
         reply = yield from helm.send(Status())
         seen.append(cast(Reading, reply.result))
@@ -93,9 +93,11 @@ def at_rest(
         rests = skill.tells_rest(seen[-1].moving)
         there = certain and off <= NEARER_DEG and (rests or not about)
         on = helm.beside(pose) and off <= about and rests
-        still = len(seen) > 1 and same(seen[-2], seen[-1])
+        still = reply.sent >= before + PAIR_S and same(seen[-2], seen[-1])
         if there or on or still:
             break
+        before = reply.sent
+        yield from wait(before + min(LONG_S, PAIR_S * (len(seen) - 1)))
     if certain and (there or not same(seen[0], seen[-1])):
         skill.expect_arrival(there=len(seen) == 1)
     return seen[-1], reply.received, rests or still

@@ -18,6 +18,7 @@ END_LEVELS = 0.3  # zoom ends so far from the ends of its range
 ODD_DEG = 0.4  # a reading farther from what was reckoned may not be of a camera at rest
 LATE_DOUBT_S = 0.15  # the age of readings is not known well: two equal ones, then
 LONGEST_DOUBT_S = 0.35
+PAIR_S = 0.25  # between two readings that are compared
 UNSURE_LEVELS = 0.1  # it is not said to stand at the very end, which it may just have missed
 FOREVER = 1e12
 WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
@@ -111,6 +112,7 @@ class Helm:
         while self.zoom_ends is None and (
             pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading) or self._moves(reading)
         ):
+            yield from wait(reply.sent + PAIR_S)
             again = yield from self.send(Status())
             before, reading, reply = reading, cast(Reading, again.result), again
             if same(before, reading):
@@ -164,7 +166,7 @@ class Helm:
         """When a reading has to be asked for that shows everything at rest."""
         pace = self.skill.paces[PAN]
         doubt = 2 * pace.other_doubt(READ_LATE) + pace.other(READ_PART) * self.skill.timing.spread
-        return max(self.quiet, self.course.rests_at()) - pace.other(READ_LATE) + min(LONGEST_DOUBT_S, doubt)
+        return max(self.quiet, self.course.rests_at()) - self.skill.read_late + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:
         """Where zoom truly stands: what was reckoned, as far as its reading and its range allow; as before, at rest."""

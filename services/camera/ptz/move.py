@@ -25,7 +25,7 @@ from services.camera.ptz.zooming import Zooming
 from services.camera.requests import Reading
 from services.errors import DeviceError
 
-MOST_LEGS = 12
+MOST_LEGS = 30  # the deadline ends most moves that do not come to an end
 STUCK = 3  # legs without effect
 MOVED = 0.15  # degrees or levels
 

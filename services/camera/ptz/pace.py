@@ -27,7 +27,7 @@ FIRST = (0.005, 0.0, 0.0, 0.4, 0.15)
 DOUBT = (0.006, 0.04, 0.12, 0.4, 0.2)
 LEAST = (0.0002, -0.3, -1.0, 0.0, 0.0)
 MOST = (0.05, 0.6, 1.0, 1.0, 1.0)
-RATE_DOUBT = 0.7  # of the guess
+RATE_DOUBT, SLOW_DOUBT = 0.7, 0.05  # of the guess; of how much slower it is than the highest speed
 COMMON, NEIGHBOURS = 0.5, 4.0  # what all speeds have in common; and how many steps apart they say little of another
 SLOWEST = 0.05
 FLOOR = 0.2  # of the guess: what other speeds teach of one makes it no slower
@@ -63,7 +63,8 @@ def _prior(guess: Sequence[float]) -> tuple[Vector, Vector]:
     apart = np.abs(steps[:, None] - steps[None, :])
     alike = COMMON + (1 - COMMON) * np.exp(-np.square(apart / NEIGHBOURS))
     cov = np.zeros((len(rates) + 5, len(rates) + 5))
-    cov[: len(rates), : len(rates)] = RATE_DOUBT**2 * alike * np.outer(rates, rates)
+    doubts = RATE_DOUBT * rates + SLOW_DOUBT * (rates[-1] - rates)
+    cov[: len(rates), : len(rates)] = alike * np.outer(doubts, doubts)
     cov[len(rates) :, len(rates) :] = np.diag(np.square(DOUBT))
     return np.concatenate([rates, np.array(FIRST)]), cov
 

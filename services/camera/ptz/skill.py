@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Literal
 
-from services.camera.ptz.pace import PAN_RATES, TILT_RATES, ZOOM_RATES, Pace
+from services.camera.ptz.pace import PAN_RATES, READ_LATE, TILT_RATES, ZOOM_RATES, Pace
 from services.camera.ptz.planes import Planes
 
 Honours = Literal["unknown", "no", "pan", "yes"]  # of a way to let the firmware drive; pan: it ignores tilt
@@ -99,6 +99,11 @@ class Skill:
         self.picture = (flip, mirror)
         self.senses[0].sign, self.senses[0].sure = (1 if mirror else -1), False
         self.senses[1].sign, self.senses[1].sure = (1 if flip else -1), False
+
+    @property
+    def read_late(self) -> float:
+        """How long after it was asked for a reading tells of, as is learnt; not of a time after its usual answer."""
+        return min(self.timing.usual, self.paces[0].other(READ_LATE))
 
     @property
     def near(self) -> float:

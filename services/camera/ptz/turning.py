@@ -25,11 +25,13 @@ SHARP_DEG = 0.05  # what a reckoning leaves open, at least
 ZOOM_COMMANDS = 1  # zoom's start is the end of a leg
 MANY_COMMANDS = 7  # after so many, a look has to be worth more
 ENOUGH_DEG = 0.4  # doubt about the place of an end that needs no look
-PROBE_DEG_S = 9.0
+PROBE_DEG_S = 4.0
 PROBE_S = 0.35  # seen in the readings, and harmless the wrong way
 MOVED_DEG = 0.3
 PROBE_LOOKS = 3
 LOOKS = 1  # readings in a leg
+BLIND_S, BLIND_SURE_S = 4.0, 8.0  # nothing turns for longer without another one; or when its speed is known
+MOST_LOOKS = 15
 LOOK_PART = 1.0  # of what a late end makes of a leg: doubt below that needs no look
 
 
@@ -90,7 +92,8 @@ class Turning:
 
     def _beside(self, now: float) -> list[int]:
         """The axes that rest beside the goal as far as is reckoned: while the other goes on, they can be put right."""
-        rest = [axis for axis in (PAN, TILT) if not self.helm.course.levels[axis]]
+        senses = self.helm.skill.senses
+        rest = [axis for axis in (PAN, TILT) if senses[axis].sure and not self.helm.course.levels[axis]]
         return [axis for axis in rest if self._off(axis, now) > self.helm.reckoned(axis) + BESIDE_DEG]
 
     def _off(self, axis: int, now: float) -> float:
@@ -168,7 +171,7 @@ class Turning:
     def _watch(self, leg: Leg, left: dict[int, int], now: float) -> Plan[float]:
         """Waits until the next end has to be sent; reads on the way where that makes the end more certain."""
         usual, spread = self.helm.skill.timing.usual, self.helm.skill.timing.spread
-        for look in range(LOOKS + 1):
+        for look in range(MOST_LOOKS):
             ends = {axis: self._end(leg, axis, now) for axis in left}
             rates = {axis: self.helm.skill.paces[axis].rate(leg.parts[axis].speed) for axis in left}
             if leg.joint:
@@ -177,14 +180,16 @@ class Turning:
             else:
                 send = min(ends.values()) - usual
             send = min([send, *(self._safe(axis, self._rate(axis), now) - usual for axis in self._along(left))])
-            if look == LOOKS or send - now < usual + spread:
+            sure = all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)
+            longest = BLIND_SURE_S if sure else BLIND_S
+            if (look >= LOOKS and send - now <= longest) or send - now < usual + spread:
                 break
             enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else self.helm.near
             small = {axis: max(LOOK_PART * spread * rate, enough) for axis, rate in rates.items()}
-            if all(self.helm.course.doubt(axis, ends[axis]) < small[axis] for axis in left):
+            certain = all(self.helm.course.doubt(axis, ends[axis]) < small[axis] for axis in left)
+            if certain and send - now <= longest:
                 break
-            latest = send - usual - spread
-            sure = all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)
+            latest = min(now + longest, send - usual - spread)
             now = yield from wait(latest if sure else min(latest, now + max(0.3, 0.5 * (latest - now))))
             reply = yield from self.helm.send(Status())
             now = reply.received
@@ -208,6 +213,9 @@ class Turning:
             now, reading = reply.received, cast(Reading, reply.result)
             if self._see_senses(reading, levels):
                 break
+        for axis in (PAN, TILT):
+            if levels[axis] and not self.helm.skill.senses[axis].sure:  # an end stop may be in its way
+                self.helm.course.flip(axis)
         self.helm.course.read(reply, reading)
         return now
 
@@ -224,6 +232,5 @@ class Turning:
                 continue
             sense.sure = True
             if moved * self.helm.course.levels[axis] < 0:
-                sense.sign = -sense.sign
                 self.helm.course.flip(axis)
         return seen

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -11,7 +13,7 @@ from services.camera.ptz.goal import Limits
 from services.camera.ptz.kept import Kept
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Identity, MoveTo, Start, Status
+from services.camera.requests import Identity, MoveTo, Reply, Start, Status
 from tests.camera.motors import Motors, drive
 
 LIMITS = Limits()
@@ -69,6 +71,78 @@ def test_motors_that_nobody_has_seen_are_brought_to_every_goal_or_it_is_said_why
             assert str(run.error)
             motors.answer(Status())
     assert failed <= 1
+
+
+def linear(motors: Motors, slowest: float) -> Motors:
+    """The same with speeds that are all a multiple of the slowest one, degrees/s."""
+    motors.table = tuple(slowest * (step + 1) for step in range(8))
+    return replace(motors)
+
+
+@pytest.mark.parametrize("slowest", [1.5, 5.0, 9.0])
+@pytest.mark.parametrize("seed", range(8))
+def test_speeds_far_from_the_first_guess_are_learnt(seed: int, slowest: float) -> None:
+    motors, skill, now = linear(any_motors(seed), slowest), Skill(), 1000.0
+    motors.now = now
+    for pan, tilt, zoom in goals(seed, 6):
+        run, took = drive(goto(LIMITS.goal(pan, tilt, zoom), LIMITS, skill, now + 90.0), motors, now=now, limit_s=200)
+        now += took
+        assert run.error is None
+        assert off(motors, pan, tilt) <= 0.55
+        assert not motors.moving
+    assert motors.pushed < 4.0
+
+
+def test_a_motor_much_slower_than_was_reckoned_from_one_reading_is_not_left_to_turn_blindly() -> None:
+    """Of the slow speed that comes last, the first reading teaches next to nothing."""
+    motors = any_motors(52)
+    motors.now = 1000.0
+    seen: list[Reply] = []
+    (pan, tilt, zoom), *_ = goals(52, 1)
+    run, _ = drive(goto(LIMITS.goal(pan, tilt, zoom), LIMITS, Skill(), 1060.0), motors, limit_s=200, seen=seen.append)
+    assert run.error is None
+    assert motors.pushed == 0.0
+    assert max(after.sent - before.received for before, after in pairwise(seen)) <= 10.0
+
+
+def test_an_axis_whose_way_nobody_has_seen_is_not_driven_into_its_stop() -> None:
+    """One that takes no diagonals shows its axes one after the other, and one of them may stand at its stop."""
+    motors = Motors(mirror=False, diagonals=False, tilt=-10.0)
+    run, _ = drive(goto(LIMITS.goal(166.0, 68.0, 0.0), LIMITS, Skill(), 1060.0), motors)
+    assert run.error is None
+    assert off(motors, 166.0, 68.0) <= 0.5
+    assert motors.pushed < 3.0
+
+
+def test_an_axis_that_goes_the_other_way_all_the_time_was_mirrored_meanwhile() -> None:
+    motors, skill = Motors(), Skill()
+    _, took = drive(goto(LIMITS.goal(80.0, 40.0, 0.0), LIMITS, skill, 1060.0), motors)
+    motors.mirror = False
+    run, _ = drive(goto(LIMITS.goal(40.0, 70.0, 0.0), LIMITS, skill, 1060.0 + took), motors, now=1000.0 + took)
+    assert run.error is None
+    assert off(motors, 40.0, 70.0) <= 0.5
+
+
+def test_a_drive_of_the_firmware_that_takes_much_longer_than_usual_is_followed_to_its_end() -> None:
+    motors = Motors(absolute="full", faster=0.1, acceleration=90.0)
+    motors.now = 1000.0
+    run, _ = drive(goto(LIMITS.goal(60.0, 95.0, 0.0), LIMITS, Skill(), 1120.0), motors)
+    assert run.error is None
+    assert off(motors, 60.0, 95.0) <= 0.5
+    assert not any(isinstance(request, Start) for request in motors.sent)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_two_readings_in_a_moment_do_not_show_a_camera_at_rest(seed: int) -> None:
+    """From a camera that answers in hundredths of a second they are equal while it turns slowly."""
+    motors = Motors(latency=0.02, jitter=0.005, says="nothing", acceleration=40.0, seed=seed)
+    skill, now = Skill(), 1000.0
+    motors.now = now
+    for pan, tilt, zoom in goals(seed, 8):
+        run, took = drive(goto(LIMITS.goal(pan, tilt, zoom), LIMITS, skill, now + 60.0), motors, now=now)
+        now += took
+        assert run.error is None
+        assert not motors.moving
 
 
 def test_what_was_learnt_is_known_again_after_a_restart(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_the_first_motion_of_an_axis_is_a_short_probe() -> None:
     motors = Motors(mirror=False)
     drive(goto(LIMITS.goal(10.0, 60.0, 0.0), LIMITS, Skill(), 1060.0), motors)
     first = next(request for request in motors.sent if isinstance(request, Start))
-    assert first.speed == 3
+    assert first.speed == 2
 
 
 def test_zoom_is_reached_after_pan_and_tilt() -> None:
