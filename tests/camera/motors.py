@@ -9,6 +9,7 @@ import random
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import atan, degrees
 from typing import Any, Literal
 
 from services.camera.plan import Plan, Run, Stage
@@ -30,7 +31,8 @@ from services.errors import DeviceError
 
 PAN = (1.0, 3.0, 6.0, 10.0, 16.0, 24.0, 34.0, 45.0)
 STEP_S = 0.02
-FULL_TURN_DEG = 100.0  # of the relative form's whole scale
+FULL_TURN_DEG = 100.0  # of the relative form's whole scale, where its parts are of a turn
+HALF_PICTURE = (1.3, 0.8)  # tangents of pan and tilt at its ends at the widest zoom, where they are of the picture
 
 
 @dataclass
@@ -113,7 +115,7 @@ class Motors:
     diagonals: bool = True
     absolute: Literal["full", "pan-only", "no"] = "no"
     tilt_off: float = 0.0
-    relative: bool = False
+    relative: Literal["picture", "turn"] | None = None  # what it goes by a part of
     timed: bool = False
     presets: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     seed: int = 1
@@ -229,8 +231,14 @@ class Motors:
     def _over(self, request: MoveOver) -> tuple[object, DeviceError | None]:
         if not self.relative:
             return None, Refused("bad request")
-        sense = FULL_TURN_DEG if self.mirror else -FULL_TURN_DEG
-        over = (-request.right * sense, request.down * sense, request.zoom * 8.0)
+        sense = 1 if self.mirror else -1
+        if self.relative == "turn":
+            right, down = request.right * FULL_TURN_DEG, request.down * FULL_TURN_DEG
+        else:
+            ends = (tangent / (1 + self.axes[2].at / 5) for tangent in HALF_PICTURE)
+            parts = zip((request.right, request.down), ends, strict=True)
+            right, down = (degrees(atan(part * end)) for part, end in parts)
+        over = (-right * sense, down * sense, request.zoom)
         self._drive_to(*(axis.at + way for axis, way in zip(self.axes, over, strict=True)))
         return None, None
 

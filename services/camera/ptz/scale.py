@@ -18,6 +18,8 @@ from services.camera.requests import Reading
 FORM = "Position"
 ZOOMS = "Position zoom"  # whether a hop takes zoom along
 STAYED_DEG = 0.3
+FAR_DEG = 3.0  # a shorter way is no measure for how far off it ended
+OFF_COUNTS, OFF_MOST = 0.2, 0.25  # of a way: what each chain of hops adds to what is usual, and how far off is too far
 LEVEL = 1.0  # zoom is read in coarse steps
 READ_DEG, TIME_S = 0.1, 0.003  # of a reading; when a hop took effect
 LEVELS = 0.5  # where zoom is while it turns
@@ -66,10 +68,20 @@ def learn(skill: Skill, hops: Sequence[Hop], to: Pose, limits: Limits, reading: 
         skill.honours[ZOOMS] = "yes" if zoomed else "no"
     skill.zoomed = (reading.zoom, to[ZOOM]) if zoomed else None
     if skill.honours[FORM] == "yes":
+        _weigh(skill, hops, to, there)
         for axis in (PAN, TILT):
             low, high = limits.ranges[axis]
             if low + EDGE_DEG < there[axis] < high - EDGE_DEG:
                 _learn(skill, axis, hops, there[axis] - to[axis])
+
+
+def _weigh(skill: Skill, hops: Sequence[Hop], to: Pose, there: Pose) -> None:
+    """A form whose hops go on ending elsewhere means something else by its parts: it is given up."""
+    way = max(abs(to[axis] - hops[0].begun[axis]) for axis in (PAN, TILT))
+    off = max(abs(there[axis] - to[axis]) for axis in (PAN, TILT))
+    skill.hops_off += OFF_COUNTS * (min(1.0, off / max(FAR_DEG, way)) - skill.hops_off)
+    if skill.hops_off > OFF_MOST:
+        skill.honours[FORM] = "no"
 
 
 def _learn(skill: Skill, axis: int, hops: Sequence[Hop], wrong: float) -> None:

@@ -86,6 +86,7 @@ class Skill:
     beside: dict[str, tuple[float, float]] = field(default_factory=dict)  # by form: pan and tilt off what was asked
     presets: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # readings where each was seen to be
     planes: Planes = field(default_factory=Planes)  # of the relative form
+    hops_off: float = 0.0  # how far from where they should its hops end, over their way
 
     def timed(self, seconds: float) -> None:
         """An answer took so long; what is usual may change with it, and what was learnt against that stays as true."""

@@ -49,7 +49,7 @@ def test_it_is_not_begun_by_a_no(flat: Flat) -> None:
 
 
 def test_parts_of_the_picture_are_known_at_every_zoom_afterwards_where_the_firmware_goes_by_them() -> None:
-    motors, skill, limits = Motors(relative=True, acceleration=120.0), Skill(), Limits()
+    motors, skill, limits = Motors(relative="picture", acceleration=120.0), Skill(), Limits()
     skill.forget_senses(flip=True, mirror=True)
     run, _ = drive(calibrate(limits, skill), motors, limit_s=300.0)
     assert run.error is None

@@ -35,7 +35,7 @@ def test_an_axis_glides_as_a_motor_with_its_top_speed_and_acceleration_does(turn
 
 @pytest.mark.parametrize("mirror", [True, False])
 def test_a_relative_form_is_found_and_its_scale_learnt_whatever_that_is(mirror: bool) -> None:
-    motors, skill, now = Motors(relative=True, acceleration=90.0, mirror=mirror), Skill(), 1000.0
+    motors, skill, now = Motors(relative="picture", acceleration=90.0, mirror=mirror), Skill(), 1000.0
     motors.now = now
     hops = []
     for pan, tilt, zoom in random_goals(12, 3):
@@ -52,6 +52,19 @@ def test_a_relative_form_is_found_and_its_scale_learnt_whatever_that_is(mirror: 
     assert not motors.pushed
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_relative_form_whose_parts_are_of_something_else_is_given_up(seed: int) -> None:
+    motors, skill, now = Motors(relative="turn", acceleration=90.0, seed=seed), Skill(), 1000.0
+    motors.now = now
+    for pan, tilt, zoom in random_goals(12, seed):
+        run, took = drive(goto(LIMITS.goal(pan, tilt, zoom), LIMITS, skill, now + 60.0), motors, now=now)
+        now += took
+        assert run.error is None
+        assert abs(LIMITS.unwrap(motors.pose[0]) - LIMITS.unwrap(pan)) <= 0.5
+        assert abs(motors.pose[1] - tilt) <= 0.5
+    assert skill.honours["Position"] == "no"
+
+
 def test_zoom_turns_with_pan_and_tilt_from_the_beginning_where_it_takes_as_long() -> None:
     ratios = []
     for seed in range(4):
@@ -65,7 +78,7 @@ def test_zoom_turns_with_pan_and_tilt_from_the_beginning_where_it_takes_as_long(
 
 
 def test_where_hops_leave_zoom_as_it_is_none_is_made_for_zoom_alone() -> None:
-    motors, skill, now = Motors(relative=True, acceleration=90.0), Skill(), 1000.0
+    motors, skill, now = Motors(relative="picture", acceleration=90.0), Skill(), 1000.0
     motors.now = now
     skill.honours[ZOOMS] = "no"
     for pan, tilt, zoom in [*random_goals(6, 3), *[(100.0, 40.0, zoom) for zoom in (0.0, 4.0, 8.0, 2.0)]]:
