@@ -29,6 +29,7 @@ from services.camera.requests import Away, BadLogin
 from services.config import load
 from services.peers import free_port, wait_until
 from services.simulators import camera as simulated
+from services.simulators.camera import aims
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.profiles import Profile
 from tests.camera.bench import PASSWORD, SHIPPED, simulator
@@ -150,6 +151,29 @@ def test_it_leaves_the_camera_as_it_was(meeting: Meeting) -> None:
         target for target in meeting.asked if "setConfig" in target or "Preset&" in target.replace("GotoPreset", "")
     ] == []
     assert meeting.state["door"]["wrong"] == 0
+
+
+@pytest.mark.parametrize(("position_abs", "command"), [("bad-request", "moveAbsolutely"), ("full", "PositionABS")])
+def test_a_position_that_leads_elsewhere_is_ended_and_left_open(
+    position_abs: str, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Firmware that takes the numbers for something else would turn right round."""
+
+    def far(request: Any, profile: Profile, stand: aims.Stand) -> aims.Drive:
+        return aims.Drive(aims.travel(stand.pose._replace(pan=stand.pose.pan + 150.0)))
+
+    monkeypatch.setitem(aims.COMMANDS, command, (lambda profile: True, far))
+    with simulator(latency_s=LATENCY_S, switches={"position_abs": position_abs}) as camera:
+        wire = wire_to(camera)
+        try:
+            found = contact(wire, Quiet(camera), lambda found: True)
+        finally:
+            wire.close()
+        state = httpx.get(f"{camera.side_door_url}/state", timeout=30).json()
+        motors = camera.server.device.ptz.motors.worked(camera.server.clock())
+    assert ("moves" if command == "moveAbsolutely" else "position_abs") in found.unknown
+    assert motors.travelled.pan < 150.0  # all speeds, there and back
+    assert abs((state["pose"]["pan"] + 180.0) % 360.0 - 180.0) <= 0.7
 
 
 def test_what_it_writes_down_tells_nothing_of_whose_camera_it_is(meeting: Meeting) -> None:

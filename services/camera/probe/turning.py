@@ -11,7 +11,7 @@ from services.camera.brands.dahua import ptz
 from services.camera.probe.findings import Findings, Speed
 from services.camera.probe.turner import STILL_DEG, Sample, Turner, apart, difference, moving
 from services.camera.probe.wire import Exchange, Wire
-from services.camera.requests import Direction, Reading
+from services.camera.requests import Direction, MoveOver, MoveTo, Reading
 
 LEVELS = (1, 3, 5)  # the middle one of a full table; the fastest would swing far
 SHORT_S, LONG_S = 0.4, 1.2
@@ -20,6 +20,7 @@ STEP_DEG = 3.0  # of the try with absolute positions
 COARSE_DEG = 4.0  # the way back begins faster than this
 RETURNS = 15
 FAR_DEG = 12.0  # more than this is not what was asked for
+WATCHES, ALIKE = 100, 3  # readings; so many that are alike, and not those before it begins to turn
 BACK = {
     Direction.LEFT: Direction.RIGHT, Direction.RIGHT: Direction.LEFT,
     Direction.UP: Direction.DOWN, Direction.DOWN: Direction.UP,
@@ -28,7 +29,6 @@ AXES = {"pan": Direction.RIGHT, "tilt": Direction.DOWN}
 ZEROS: dict[str, tuple[str, object, object]] = {  # newer forms: firmware that has them takes a zero; then, else
     "position_relative": ("start&code=Position&arg1=0&arg2=0&arg3=0", "works", "bad-request"),
     "continuously": ("start&code=Continuously&arg1=0&arg2=0&arg3=0&arg4=1", True, False),
-    "moves": ("moveRelatively&arg1=0&arg2=0&arg3=0", "readings", "none"),
 }
 
 
@@ -42,6 +42,7 @@ def turn(wire: Wire, found: Findings) -> None:
             _speeds(turner, axis, direction)
         _honesty(turner)
         _absolute(turner)
+        _shares(turner)
     finally:
         _home(turner, home)
     for switch, (action, works, otherwise) in ZEROS.items():
@@ -145,6 +146,24 @@ def _absolute(turner: Turner) -> None:
     _watched(turner, here)
 
 
+def _shares(turner: Turner) -> None:
+    """Shares of half a turn: over none, and to where it stands; one that is taken for something else is watched."""
+    here = turner.rest().reading
+    moves = "none"
+    if _done(
+        turner.wire.ask(ptz.move_over(MoveOver(0.0, 0.0, 0.0, "moveRelatively"), turner.channel), "moveRelatively")
+    ):
+        moves = "relative"
+    to = MoveTo(here.pan, here.tilt, here.zoom, "moveAbsolutely")
+    turner.resting = None
+    if _done(turner.wire.ask(ptz.move_to(to, turner.channel), "moveAbsolutely to where it stands")):
+        if apart(here, _watched(turner, here).reading) > NEAR_DEG:
+            turner.found.unknown["moves"] = "moveAbsolutely is taken, but it did not stay where it stands"
+            return
+        moves = "readings"
+    turner.found.switches["moves"] = moves
+
+
 def _go(turner: Turner, goal: Reading) -> Exchange:
     arguments = f"arg1={(180.0 - goal.pan) % 360.0:.1f}&arg2={goal.tilt:.1f}&arg3={goal.zoom:.0f}"
     target = f"/cgi-bin/ptz.cgi?action=start&channel={turner.channel}&code=PositionABS&{arguments}"
@@ -153,16 +172,17 @@ def _go(turner: Turner, goal: Reading) -> Exchange:
 
 
 def _watched(turner: Turner, origin: Reading) -> Sample:
-    """Comes to rest; a camera that goes far away instead is stopped."""
-    for _ in range(100):
-        before, now = turner.read(), turner.read()
+    """Comes to rest; a camera that goes far away instead is stopped: a start takes the place of any motion."""
+    last, equal = turner.read(), 0
+    for _ in range(WATCHES):
+        now = turner.read()
         if max(map(abs, difference(origin, now.reading))) > FAR_DEG:
-            turner.wire.ask(
-                f"/cgi-bin/ptz.cgi?action=stop&channel={turner.channel}&code=PositionABS&arg1=0&arg2=0&arg3=0"
-            )
+            with turner.turning(Direction.LEFT, 1):
+                break
+        equal = equal + 1 if apart(last.reading, now.reading) < STILL_DEG else 0
+        if equal >= ALIKE:
             break
-        if apart(before.reading, now.reading) < STILL_DEG:
-            break
+        last = now
         turner.wire.pause(0.1)
     return turner.rest()
 

@@ -132,6 +132,6 @@ COMMANDS: dict[str, tuple[Takes, How]] = {
     "Position": (lambda profile: profile.position_relative == "works", _relative),
     "Continuously": (lambda profile: profile.continuously, _timed),
     "moveAbsolutely": (lambda profile: profile.moves == "readings", _to_shares),
-    "moveRelatively": (lambda profile: profile.moves == "readings", _by_shares),
+    "moveRelatively": (lambda profile: profile.moves != "none", _by_shares),
     "moveDirectly": (lambda profile: profile.moves == "readings", _at_rectangle),
 }

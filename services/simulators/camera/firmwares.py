@@ -110,6 +110,24 @@ PROFILES: dict[str, Profile] = {
         lens_mask=False,
         event_blank_lines=2,
     ),
+    # Turns by shares of half a turn from where it is, and to no position.
+    "sd1a-2019": Profile(
+        model="SD1A203T-GN",
+        firmware="2.623.0000000.3.R",
+        built="2019-11-27",
+        version_form="one line",
+        nonce="single-use",
+        challenge_spacing="spaced",
+        ptz_channels=(1,),
+        error_style="400-body",
+        daynight="VideoInDayNight",
+        moves="relative",
+        presets_form="long",
+        preset_max=300,
+        status_form="b",
+        move_status="always-idle",
+        event_form="A",
+    ),
     # The newest: SHA-256, timed moves, positions in shares of the travel.
     "sd2a-2023": Profile(
         model="SD2A500HB-GN-A-PV",

@@ -44,7 +44,7 @@ class Profile:
     position_abs: Literal["full", "pan-only", "bad-request"] = "bad-request"
     position_abs_tilt_off: float = 0.0  # degrees beside the goal
     position_relative: Literal["works", "bad-request"] = "bad-request"  # code Position
-    moves: Literal["none", "readings"] = "none"  # moveAbsolutely, moveRelatively and moveDirectly
+    moves: Literal["none", "relative", "readings"] = "none"  # moveRelatively; moveAbsolutely and moveDirectly too
     continuously: bool = False  # timed moves
     mirror_inverts_motors: bool = True
     unset_preset: Literal["error", "ok"] = "error"  # what going there is answered

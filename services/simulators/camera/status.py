@@ -56,9 +56,9 @@ def protocols() -> Iterator[str]:
 def capabilities(profile: Profile, camera: WorldCamera) -> Iterator[str]:
     """The lines of what the firmware can do; whether it takes PositionABS is not among them."""
     low, high = camera.tilt_range
-    moves = profile.moves == "readings"
+    absolute, relative = profile.moves == "readings", profile.moves != "none"
     caps: dict[str, bool | int] = {"AutoPan": profile.auto_scan, "AutoScan": profile.auto_scan, "Aux": False}
-    caps |= {"Focus": False, "Iris": False, "MoveAbsolutely": moves, "MoveRelatively": moves, "Pan": True}
+    caps |= {"Focus": False, "Iris": False, "MoveAbsolutely": absolute, "MoveRelatively": relative, "Pan": True}
     caps |= {"PanSpeedMax": len(profile.pan_speeds), "PanSpeedMin": 1, "Pattern": False, "Preset": True}
     caps |= {"PresetMax": profile.preset_max, "PresetMin": 1}
     caps |= {"PtzMotionRange.HorizontalAngle[0]": 0, "PtzMotionRange.HorizontalAngle[1]": 360}
