@@ -91,7 +91,8 @@ class CameraService:
         self.early = Early(self.answers)
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
-        self.trips = Trips(config, self.bulletin, self.places)
+        self.abilities = Abilities(config.state and config.state / f"{config.name}-can.json", self._has_time)
+        self.trips = Trips(config, self.bulletin, self.places, self.abilities)
         self.motors.skill = self.trips.skill
         self.scanner = Scanner(config, self.trips.skill, eye, analyst, self.bulletin, self.places)
         self.scanner.begin = self._begin
@@ -102,7 +103,6 @@ class CameraService:
         self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes, self.calibrator)
         self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=hears)
         self.upkeep = Upkeep(config.name, config.clock, self.bulletin.facts, self._has_time)
-        self.abilities = Abilities(config.state and config.state / f"{config.name}-can.json", self._has_time)
         self._polling = False
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:

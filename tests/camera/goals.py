@@ -16,6 +16,7 @@ from pydantic import SecretStr
 
 from services.camera.address import Address
 from services.camera.brands.amcrest import Amcrest
+from services.camera.capabilities import Capabilities, GetCapabilities
 from services.camera.plan import Plan, Run, Stage
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import Arrival, goto
@@ -97,6 +98,8 @@ class Rig:
         address = Address("http://192.0.2.9", "ros", SecretStr("secret123"))
         self.client = Amcrest(address, self.wire)
         self.skill.forget_senses(flip=True, mirror=True)
+        told = cast(Capabilities, self._send(GetCapabilities("motors"), 0).result)  # as the service asks at first
+        self.skill.believe(absolute=told.absolute, relative=told.relative)
         self.near = cast(Reading, self._send(Status(), 0).result)  # as the service polls it
 
     def go(self, goal: Goal, near: float = 0.0, **more: Any) -> Outcome:
@@ -219,5 +222,5 @@ def wanted(profile: Profile) -> float:
 
 
 def positions(profile: Profile) -> bool:
-    """Whether it lets its firmware drive to a position."""
-    return profile.position_abs == "full" or profile.moves == "readings"
+    """Whether it lets its firmware drive to any position, or over any way."""
+    return profile.position_abs == "full" or profile.moves != "none"

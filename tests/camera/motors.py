@@ -13,6 +13,7 @@ from math import atan, degrees
 from typing import Any, Literal
 
 from services.camera.plan import Plan, Run, Stage
+from services.camera.ptz.skill import RelativeForm
 from services.camera.requests import (
     Direction,
     GotoPreset,
@@ -31,8 +32,9 @@ from services.errors import DeviceError
 
 PAN = (1.0, 3.0, 6.0, 10.0, 16.0, 24.0, 34.0, 45.0)
 STEP_S = 0.02
-FULL_TURN_DEG = 100.0  # of the relative form's whole scale, where its parts are of a turn
+WHOLE_DEG = 100.0  # of the relative form's scale, where its parts are of a turn
 HALF_PICTURE = (1.3, 0.8)  # tangents of pan and tilt at its ends at the widest zoom, where they are of the picture
+HALF_VIEW = (52.0, 35.0)  # degrees to its ends at the widest zoom, where they are of the angle of view
 
 
 @dataclass
@@ -115,7 +117,8 @@ class Motors:
     diagonals: bool = True
     absolute: Literal["full", "pan-only", "no"] = "no"
     tilt_off: float = 0.0
-    relative: Literal["picture", "turn"] | None = None  # what it goes by a part of
+    relative: Literal["picture", "view", "turn", "place"] | None = None  # what it goes by a part of; a place: goes to
+    relative_form: RelativeForm = "Position"
     timed: bool = False
     presets: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     seed: int = 1
@@ -229,15 +232,18 @@ class Motors:
             axis.wanted = 0.0
 
     def _over(self, request: MoveOver) -> tuple[object, DeviceError | None]:
-        if not self.relative:
+        if not self.relative or request.form != self.relative_form:
             return None, Refused("bad request")
-        sense = 1 if self.mirror else -1
+        sense, larger, parts = 1 if self.mirror else -1, 1 + self.axes[2].at / 5, (request.right, request.down)
+        if self.relative == "place":
+            self._drive_to(177.0 - 177.0 * parts[0], 50.0 + 60.0 * parts[1], 4.0 + request.zoom / 2)
+            return None, None
         if self.relative == "turn":
-            right, down = request.right * FULL_TURN_DEG, request.down * FULL_TURN_DEG
+            right, down = (part * WHOLE_DEG for part in parts)
+        elif self.relative == "view":
+            right, down = (part * half / larger for part, half in zip(parts, HALF_VIEW, strict=True))
         else:
-            ends = (tangent / (1 + self.axes[2].at / 5) for tangent in HALF_PICTURE)
-            parts = zip((request.right, request.down), ends, strict=True)
-            right, down = (degrees(atan(part * end)) for part, end in parts)
+            right, down = (degrees(atan(part * half / larger)) for part, half in zip(parts, HALF_PICTURE, strict=True))
         over = (-right * sense, down * sense, request.zoom)
         self._drive_to(*(axis.at + way for axis, way in zip(self.axes, over, strict=True)))
         return None, None

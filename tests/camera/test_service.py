@@ -10,7 +10,8 @@ import pytest
 
 from services import payloads
 from services.bus import Message
-from services.camera.requests import Away, BadLogin, Direction, Start, Status, Stop
+from services.camera.capabilities import Capabilities, GetCapabilities
+from services.camera.requests import Away, BadLogin, Direction, MoveOver, MoveTo, Start, Status, Stop
 from services.errors import BadMessage
 from services.topics import read
 from tests.camera.flat import Flat
@@ -42,6 +43,19 @@ def test_goto_is_accepted_runs_and_is_done_when_the_camera_rests_there(flat: Fla
     assert flat.motors.running is None
     assert flat.last()["position"]["place"] == "Kitchen"
     assert flat.last()["position"]["moving"] is False
+
+
+@pytest.mark.parametrize("takes", [True, False])
+def test_forms_that_the_camera_says_it_does_not_take_are_not_tried(just_started: Flat, takes: bool) -> None:
+    flat = just_started
+    flat.camera.answers[GetCapabilities] = lambda asked: Capabilities(absolute=takes, relative=takes)
+    flat.until(lambda: flat.service.abilities.present is not None)
+    flat.order("Goto", "Door")
+    flat.until(flat.ended)
+    flat.order("Goto", "Sofa", order_id="2")  # a move tries but one or two of what it does not know
+    flat.until(lambda: flat.ended("2"))
+    tried = {request.form for request in flat.motors.sent if isinstance(request, MoveTo | MoveOver)}
+    assert tried == {"PositionABS", "Position", *(("moveAbsolutely", "moveRelatively") if takes else ())}
 
 
 def test_keys_and_place_names_are_matched_without_regard_to_case(flat: Flat) -> None:

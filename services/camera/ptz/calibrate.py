@@ -17,7 +17,6 @@ from services.camera.ptz.goal import Goal, Limits
 from services.camera.ptz.helm import Helm, levels_of
 from services.camera.ptz.move import Arrival, goto
 from services.camera.ptz.pace import HALF_CHANGE, READ_LATE
-from services.camera.ptz.scale import FORM
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
 from services.camera.requests import Reading, Status
@@ -52,7 +51,7 @@ def calibrate(limits: Limits, skill: Skill) -> Plan[Arrival]:
             now = yield from _leg(limits, skill, axis, speed)
     for goal in _places(limits):
         now = (yield from goto(goal, limits, skill, now + MOVE_S)).at
-        if skill.honours.get(FORM) != "yes":
+        if all(skill.honours.get(form) != "yes" for form in skill.scales):
             break
     return (yield from goto(began, limits, skill, now + MOVE_S))
 

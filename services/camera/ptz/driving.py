@@ -17,6 +17,7 @@ from services.camera.requests import Reading, Refused, Reply, Request, Status
 MOST_DRIVES = 4  # in one move
 TRY_LEFT = 7  # commands; with fewer nothing new is tried
 LOOKS = 30  # less and less often
+THERE_DEG = 0.15  # what is farther off is on its last bit of way
 LONG_S = 2.0  # a drive that takes longer is looked at on the way, which costs no time
 
 
@@ -90,7 +91,9 @@ def at_rest(
         seen.append(cast(Reading, reply.result))
         pose = helm.limits.pose(seen[-1])
         off = max(abs(pose[axis] - to[axis]) for axis in (PAN, TILT))
-        rests = skill.tells_rest(seen[-1].moving)
+        if len(seen) > 1 and seen[-2].moving and same(seen[-2], seen[-1]):
+            skill.says_late = True
+        rests = skill.tells_end(seen[-1].moving)
         there = certain and off <= NEARER_DEG and (rests or not about)
         on = helm.beside(pose) and off <= about and rests
         still = reply.sent >= before + PAIR_S and same(seen[-2], seen[-1])
@@ -99,5 +102,5 @@ def at_rest(
         before = reply.sent
         yield from wait(before + min(LONG_S, PAIR_S * (len(seen) - 1)))
     if certain and (there or not same(seen[0], seen[-1])):
-        skill.expect_arrival(there=len(seen) == 1)
+        skill.expect_arrival(there=len(seen) == 1 and off <= max(THERE_DEG, about))
     return seen[-1], reply.received, rests or still

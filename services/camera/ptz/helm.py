@@ -8,7 +8,7 @@ from services.camera.device import same
 from services.camera.plan import Plan, ask, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM, Course
 from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
-from services.camera.ptz.pace import READ_LATE, READ_PART
+from services.camera.ptz.pace import HALF_CHANGE, READ_LATE, READ_PART
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import stop as until_confirmed
 from services.camera.requests import Direction, Reading, Reply, Request, Start, Status
@@ -166,6 +166,7 @@ class Helm:
         """When a reading has to be asked for that shows everything at rest."""
         pace = self.skill.paces[PAN]
         doubt = 2 * pace.other_doubt(READ_LATE) + pace.other(READ_PART) * self.skill.timing.spread
+        doubt += max(self.skill.paces[axis].other_doubt(HALF_CHANGE) * self._fastest(axis) for axis in (PAN, TILT))
         return max(self.quiet, self.course.rests_at()) - self.skill.read_late + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:

@@ -70,6 +70,8 @@ class Homing:
         distance = helm.aim[axis] - helm.course.stopped(axis, now + helm.skill.timing.usual)
         low, high = helm.limits.ranges[axis]
         room = high - helm.aim[axis] if distance > 0 else helm.aim[axis] - low
+        if helm.course.levels[axis] * distance > 0:  # it turns on until a start takes effect
+            room -= helm.skill.paces[axis].rate(abs(helm.course.levels[axis])) * helm.skill.timing.spread
         return Way(distance, room, helm.skill.paces[axis], helm.near)
 
     def _leg(self, way: Way) -> Leg:

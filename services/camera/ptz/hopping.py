@@ -9,7 +9,6 @@ long they begin sooner. Not here: how an axis glides (`glide.py`), how large the
 
 from __future__ import annotations
 
-from math import radians, tan
 from typing import cast
 
 from services.camera.plan import Plan, wait
@@ -17,18 +16,23 @@ from services.camera.ptz import scale
 from services.camera.ptz.course import PAN, TILT, ZOOM, ZOOM_SLOWS_S
 from services.camera.ptz.driving import at_rest
 from services.camera.ptz.glide import Glide
+from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE
-from services.camera.ptz.scale import FORM, Hop, Turned
+from services.camera.ptz.planes import Planes
+from services.camera.ptz.scale import Hop, Turned
+from services.camera.ptz.skill import RelativeForm
 from services.camera.requests import MoveOver, Reading, Refused, Reply, Status
 
 MOST = 6  # hops without a rest
 TURNS = 4  # of them in one move
-MIDDLE = 0.95  # of the picture's half is gone in one hop at most
+MIDDLE = 0.95  # of the whole is gone in one hop at most
 SPARE_LEVELS = 1.0  # beyond an end of zoom's range, so that it is met exactly
 ABOUT_DEG = 3.0  # a hop that ends so far from where it should is followed by another at once
+EXACT_DEG = 0.4  # what ends so near needs one look that is as reckoned, where none tells of rest
 MIDST_DEG = 6.0  # what is farther off was out of reach, and not the fault of a late answer
 SHARP_DEG = 0.05  # what the reckoning leaves open, at least
+FAR_DEG = 360.0  # no hop goes farther
 TRY_DEG = 12.0  # a first hop, whose scale is a guess
 BULK = 1.5  # answers: a start at full speed that is shorter is not worth it
 LATE_LOOK = 2.0  # answers: a look as late as that does not delay what it is for
@@ -40,6 +44,7 @@ class Hopping:
 
     def __init__(self, helm: Helm) -> None:
         self.helm = helm
+        self.form: RelativeForm = "Position"  # the one of the latest hops
         self.turns = 0
         self.zooms = False  # whether zoom is to change
         self.glides: list[Glide] = []
@@ -47,30 +52,57 @@ class Hopping:
 
     def hop(self, now: float) -> Plan[tuple[Reading, float] | None]:
         """Goes to the goal, or near; None where the firmware has no such form, or it did not help."""
-        skill = self.helm.skill
-        honoured = skill.honours.get(FORM, "unknown")
-        able = honoured in ("unknown", "yes") and all(one.sure for one in skill.senses)
-        if not able or self.turns >= TURNS or self.helm.left < FEW:
+        if not all(one.sure for one in self.helm.skill.senses):
             return None
         here = self.helm.course.origin
         self.zooms = abs(self.helm.aim[ZOOM] - here[ZOOM]) > self.helm.zoom_near / 2
-        if not self.helm.beside(here) and not self._takes_zoom():
-            return None  # zoom alone is missing, and hops leave it
+        for form in self._forms():
+            if self.turns >= TURNS or self.helm.left < FEW:
+                break
+            self.form = form
+            if not self.helm.beside(here) and not self._takes_zoom():
+                continue  # zoom alone is missing, and hops leave it
+            try:
+                return (yield from self._go(now))
+            except Refused:
+                self.helm.skill.honours[form] = "no"
+        return None
+
+    def _forms(self) -> list[RelativeForm]:
+        """Those that it honours; where none is known, those that it may."""
+        honours = {form: self.helm.skill.honours.get(form, "unknown") for form in self.helm.skill.scales}
+        how = "yes" if "yes" in honours.values() else "unknown"
+        return [form for form in honours if honours[form] == how]
+
+    def _go(self, now: float) -> Plan[tuple[Reading, float]]:
+        """A chain of hops, or one that is a try, to rest."""
+        certain = self._honoured == "yes"
         self.turns += 1
         self.glides, self.hops = [], []
-        try:
-            now = yield from (self._chain(now) if honoured == "yes" else self._send(now, TRY_DEG))
-        except Refused:
-            skill.honours[FORM] = "no"
-            return None
+        now = yield from (self._chain(now) if certain else self._send(now, TRY_DEG))
         pan, tilt, zoom = self.glides
         to = (pan.goal, tilt.goal, zoom.goal)
         arrives = max(self._ends(), zoom.ends)
         self.helm.rests = arrives
-        reading, now, _ = yield from at_rest(self.helm, arrives, to, now, certain=honoured == "yes", about=ABOUT_DEG)
-        scale.learn(skill, self.hops, to, self.helm.limits, reading)
+        about = 0.0 if self._exact(to) else ABOUT_DEG
+        reading, now, _ = yield from at_rest(self.helm, arrives, to, now, certain=certain, about=about)
+        scale.learn(self.helm.skill, self.form, self.hops, to, self.helm.limits, reading)
         self.helm.stand(reading)
         return reading, now
+
+    def _exact(self, to: Pose) -> bool:
+        """Whether it surely ends at the goal, so that a look on its last bit of way is enough."""
+        off = max(abs(self.helm.aim[axis] - to[axis]) for axis in (PAN, TILT))
+        unsure = scale.unsure(self.helm.skill.scales[self.form], self.hops)
+        return not self.helm.skill.says_late and off + 2 * unsure <= EXACT_DEG
+
+    @property
+    def _honoured(self) -> str:
+        return self.helm.skill.honours.get(self.form, "unknown")
+
+    @property
+    def _planes(self) -> Planes:
+        return self.helm.skill.scales[self.form].planes
 
     def _chain(self, now: float) -> Plan[float]:
         """To where the goal can be reached, there in flight, and from rest what is left then."""
@@ -128,7 +160,7 @@ class Hopping:
         return abs(self.helm.aim[ZOOM] - self.helm.course.origin[ZOOM]) / pace.rate(1)
 
     def _takes_zoom(self) -> bool:
-        return self.zooms and self.helm.skill.honours.get(scale.ZOOMS) != "no"
+        return self.zooms and self.helm.skill.honours.get(scale.zooms(self.form)) != "no"
 
     def _before(self, axis: int) -> float:
         """How far before its goal a hop should begin that leads there: within its reach, and before it would brake."""
@@ -156,20 +188,20 @@ class Hopping:
 
     def _reach(self, axis: int, zoom: float) -> float:
         """How far one hop goes at most, degrees."""
-        return scale.angle(MIDDLE, self.helm.skill.planes.at(zoom)[axis])
+        return self._planes.angle(axis, MIDDLE, zoom)
 
-    def _send(self, now: float, most: float = 90.0) -> Plan[float]:
+    def _send(self, now: float, most: float = FAR_DEG) -> Plan[float]:
         """One hop towards the goal, from where it will be when that takes effect."""
         helm = self.helm
         there = [self._at(axis, now + helm.skill.timing.usual)[0] for axis in range(3)]
-        planes, parts = helm.skill.planes.at(there[ZOOM]), []
+        parts = []
         for axis in (PAN, TILT):
             reach = min(most, self._reach(axis, there[ZOOM]))
             way = min(reach, max(-reach, helm.aim[axis] - there[axis]))
-            parts.append(helm.skill.senses[axis].sign * tan(radians(way)) / planes[axis])
+            parts.append(helm.skill.senses[axis].sign * self._planes.part(axis, way, there[ZOOM]))
         right, down = (min(1.0, max(-1.0, part)) for part in parts)
         zooms = self._takes_zoom() and most > TRY_DEG
-        request = MoveOver(right, down, self._zoom_aim() - there[ZOOM] if zooms else 0.0)
+        request = MoveOver(right, down, self._zoom_aim() - there[ZOOM] if zooms else 0.0, self.form)
         self._glide(request, (yield from helm.send(request)))
         return self.glides[0].answered
 
@@ -184,11 +216,10 @@ class Hopping:
         late = reply.received - reply.sent - helm.skill.timing.usual
         acted = reply.received - helm.skill.paces[PAN].other(ACT_PART) * late
         poses = [self._at(axis, acted) for axis in range(3)]
-        planes = helm.skill.planes.at(poses[ZOOM][0])
-        right, down = (
-            scale.angle(part, planes[axis]) * helm.skill.senses[axis].sign
-            for axis, part in enumerate((request.right, request.down))
+        pan, tilt = (
+            part * sense.sign for part, sense in zip((request.right, request.down), helm.skill.senses, strict=False)
         )
+        right, down = (self._planes.angle(axis, part, poses[ZOOM][0]) for axis, part in enumerate((pan, tilt)))
         turned = None if self.glides else self._turned(acted, reply, late)
         self.glides = []
         for axis, (way, (place, speed)) in enumerate(zip((right, down, request.zoom), poses, strict=True)):
@@ -200,7 +231,7 @@ class Hopping:
             self.glides.append(Glide(acted, place, speed, goal, top, 1 / slow, reply.received))
         begun, speeds = ((pan, tilt, zoom) for pan, tilt, zoom in zip(*poses, strict=True))
         tops = (self.glides[PAN].top, self.glides[TILT].top, self.glides[ZOOM].top)
-        self.hops.append(Hop(begun, (right, down, request.zoom), speeds, tops, turned))
+        self.hops.append(Hop(begun, (pan, tilt), (right, down, request.zoom), speeds, tops, turned))
         helm.course.leave(begun)
 
     def _turned(self, acted: float, reply: Reply, late: float) -> tuple[Turned, Turned]:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from services.camera.ptz.pace import Pace
 from services.camera.ptz.planes import Planes
-from services.camera.ptz.skill import KEEP, Honours, Sense, Skill
+from services.camera.ptz.skill import KEEP, Honours, RelativeForm, Sense, Skill
 from services.camera.requests import Identity
 from services.whole_file import write_whole
 
@@ -29,10 +29,14 @@ class _Filter(BaseModel):
     cov: list[list[float]]
 
 
-class _Kept(BaseModel):
-    """The file."""
+class _Law(_Filter):
+    likely: float
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+class _Kept(BaseModel):
+    """The file; what is in one of an older version and no longer known is left."""
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
     serial: str
     firmware: str
     paces: tuple[_Filter, _Filter, _Filter]
@@ -50,7 +54,7 @@ class _Kept(BaseModel):
     honours: dict[str, Honours]
     beside: dict[str, Pair]
     presets: dict[int, Triple]
-    planes: _Filter | dict[float, Pair]  # a table, as it was kept once, is not taken in
+    scales: dict[RelativeForm, dict[str, _Law]] = {}
 
 
 class Kept:
@@ -123,7 +127,10 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
         honours=skill.honours,
         beside=skill.beside,
         presets=skill.presets,
-        planes=_kept_filter(skill.planes),
+        scales={
+            form: {one.law.name: _Law(likely=one.likely, **_kept_filter(one).model_dump()) for one in scale.laws}
+            for form, scale in skill.scales.items()
+        },
     )
 
 
@@ -140,8 +147,12 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
     filters: list[tuple[Pace | Planes, _Filter]] = [
         *zip((*skill.paces, *skill.drives), (*kept.paces, *kept.drives), strict=True)
     ]
-    if isinstance(kept.planes, _Filter):
-        filters.append((skill.planes, kept.planes))
+    for form, scale in skill.scales.items():
+        for planes in scale.laws:
+            law = kept.scales.get(form, {}).get(planes.law.name)
+            if law is not None:
+                planes.likely = law.likely
+                filters.append((planes, law))
     for own, known in filters:
         mean, cov = np.array(known.mean, float), np.array(known.cov, float)
         if mean.shape == own.mean.shape and cov.shape == own.cov.shape:

@@ -1,26 +1,47 @@
-"""How large the scale of the relative form is at each zoom: the tangent of its end, a point of the picture's plane.
+"""What the parts of a hop by a relative form are parts of, and how large that is at each zoom.
 
-The tangents of both axes shrink alike when zoom makes the picture larger, at levels near each other by about as much
-more or less than is thought. A Kalman filter over their logarithms keeps the guess and its doubt: one hop teaches
-both axes and all levels, each as far as it tells. Pure. What a hop tells: `scale.py`.
+No firmware tells: it may be a point of the picture, an angle of view, or a turn, each a law of its own. By every law a
+Kalman filter keeps the logarithms of how large the whole is for pan and tilt, and how much less at each level of zoom:
+one hop teaches both axes and all levels, each as far as it tells. The law that has foretold hops best is believed.
+Pure. What a hop tells: `scale.py`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import exp, hypot
+from math import atan, degrees, exp, hypot, log, radians, sin, tan
 
 import numpy as np
 
 from services.camera.ptz.pace import Vector, taught
 
-GUESS = (1.0, 0.56)  # pan and tilt at the widest zoom
 LEVELS = 9  # 0 to 8
-DOUBT = 0.5  # of the guess, as a share
 LEVEL_DOUBT, ALONE_DOUBT, APART = 0.1, 0.02, 3.0  # of a level's magnification: with its neighbours, on its own
-AGE = 0.005  # more doubt about each with every hop
+AGE, TURN_AGE = 0.005, 0.0005  # more doubt about each with every hop; of what zoom does not change
 BENT = 0.2  # of what was off: a tangent is no straight line
 AXES = 2
+FORGETS = 0.95  # what a law has foretold counts so much with each hop more
+UNLIKELY = 2.0  # a law that is not the first one, before anything was seen; a logarithm
+OUT = 3.0  # standard deviations: what is farther off tells no more against a law
+
+
+@dataclass(frozen=True)
+class Law:
+    """`guess`: the whole of pan and tilt at the widest zoom, a tangent where `bent`, else degrees; `doubt`: a share.
+
+    `zooms`: it shrinks as the picture grows.
+    """
+
+    name: str
+    guess: tuple[float, float]
+    doubt: float
+    bent: bool = False
+    zooms: bool = True
+
+
+POINT = Law("point", (1.0, 0.56), 0.5, bent=True)
+VIEW = Law("view", (45.0, 29.0), 0.5)
+TURN = Law("turn", (180.0, 180.0), 1.0, zooms=False)
 
 
 def larger(zoom: float) -> float:
@@ -28,41 +49,60 @@ def larger(zoom: float) -> float:
     return 1.0 + zoom / 4.0
 
 
-def growth(zoom: float) -> float:
-    """By which share it grows there with one level more."""
-    return 1.0 / (4.0 + zoom)
-
-
-def _doubts() -> Vector:
+def _doubts(doubt: float) -> Vector:
     levels = np.arange(LEVELS)
     apart = (levels[:, None] - levels[None, :]) / APART
     cov = np.zeros((AXES + LEVELS, AXES + LEVELS))
-    cov[:AXES, :AXES] = DOUBT**2 * np.eye(AXES)
+    cov[:AXES, :AXES] = doubt**2 * np.eye(AXES)
     cov[AXES:, AXES:] = LEVEL_DOUBT**2 * np.exp(-np.square(apart) / 2) + ALONE_DOUBT**2 * np.eye(LEVELS)
     return cov
 
 
 @dataclass
 class Planes:
-    """The logarithms of both tangents over the guess, then of each level's; and their covariance."""
+    """By one law: the logarithms of both wholes over the guess, then of each level's; and their covariance."""
 
+    law: Law = POINT
+    likely: float = 0.0  # the logarithm of how likely the law is, by its last hops
     mean: Vector = field(default_factory=lambda: np.zeros(AXES + LEVELS))
-    cov: Vector = field(default_factory=_doubts)
+
+    def __post_init__(self) -> None:
+        self.cov = _doubts(self.law.doubt)
 
     def at(self, zoom: float) -> tuple[float, float]:
-        """The tangents of pan and tilt at a zoom."""
+        """The wholes of pan and tilt at a zoom."""
+        shrinks = larger(zoom) if self.law.zooms else 1.0
         pan, tilt = (
-            guess * exp(float(self.weights(axis, zoom) @ self.mean)) / larger(zoom) for axis, guess in enumerate(GUESS)
+            guess * exp(float(self.weights(axis, zoom) @ self.mean)) / shrinks
+            for axis, guess in enumerate(self.law.guess)
         )
         return pan, tilt
 
+    def angle(self, axis: int, part: float, zoom: float) -> float:
+        """How far a part goes, degrees."""
+        whole = self.at(zoom)[axis]
+        return degrees(atan(part * whole)) if self.law.bent else part * whole
+
+    def part(self, axis: int, way: float, zoom: float) -> float:
+        """The part that goes so many degrees."""
+        return (tan(radians(way)) if self.law.bent else way) / self.at(zoom)[axis]
+
+    def bends(self, way: float) -> float:
+        """By how much a way changes, degrees, when the logarithm of the whole changes by 1."""
+        return degrees(sin(2 * radians(way))) / 2 if self.law.bent else way
+
+    def growth(self, zoom: float) -> float:
+        """By which share the whole shrinks there with one level more."""
+        return 1.0 / (4.0 + zoom) if self.law.zooms else 0.0
+
     def weights(self, axis: int, zoom: float) -> Vector:
-        """How far each number counts for a tangent's logarithm."""
+        """How far each number counts for a whole's logarithm."""
         found = np.zeros(AXES + LEVELS)
         found[axis] = 1.0
-        at = min(LEVELS - 1.0, max(0.0, zoom))
-        below = min(LEVELS - 2, int(at))
-        found[AXES + below], found[AXES + below + 1] = 1.0 - (at - below), at - below
+        if self.law.zooms:
+            at = min(LEVELS - 1.0, max(0.0, zoom))
+            below = min(LEVELS - 2, int(at))
+            found[AXES + below], found[AXES + below + 1] = 1.0 - (at - below), at - below
         return found
 
     def doubt(self, slope: Vector) -> float:
@@ -71,8 +111,28 @@ class Planes:
 
     def age(self) -> None:
         """A hop is over: where zoom stands in a level is not always the same."""
-        self.cov = self.cov + AGE**2 * np.eye(len(self.mean))
+        self.cov = self.cov + (AGE if self.law.zooms else TURN_AGE) ** 2 * np.eye(len(self.mean))
 
     def learn(self, slope: Vector, wrong: float, noise: float) -> None:
         """Something that changes so with each number was off by that much; `noise` is one standard deviation."""
+        spread = hypot(self.doubt(slope), noise)
+        self.likely = FORGETS * self.likely - min(OUT, abs(wrong) / spread) ** 2 / 2 - log(spread)
         self.mean, self.cov = taught(self.mean, self.cov, slope, wrong, hypot(noise, BENT * wrong))
+
+
+@dataclass
+class Scale:
+    """One form, by each law that it may follow; `off`: how far from where they should its hops end, over their way."""
+
+    laws: tuple[Planes, ...]
+    off: float = 0.0
+
+    @property
+    def planes(self) -> Planes:
+        """By the law that is believed; the first of those that are as likely."""
+        return max(self.laws, key=lambda one: one.likely)
+
+
+def scale_of(*laws: Law) -> Scale:
+    """A form of which nothing is known but which law is the most likely: the first."""
+    return Scale(tuple(Planes(law, likely=-UNLIKELY if number else 0.0) for number, law in enumerate(laws)))

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan, degrees, hypot, radians, sin
+from math import hypot, sqrt
 
 import numpy as np
 
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import EDGE_DEG, Limits, Pose
-from services.camera.ptz.pace import Seen, Told
-from services.camera.ptz.planes import growth
-from services.camera.ptz.skill import Skill
+from services.camera.ptz.pace import Seen, Told, Vector
+from services.camera.ptz.planes import Planes, Scale
+from services.camera.ptz.skill import RelativeForm, Skill
 from services.camera.requests import Reading
 
-FORM = "Position"
-ZOOMS = "Position zoom"  # whether a hop takes zoom along
 STAYED_DEG = 0.3
 FAR_DEG = 3.0  # a shorter way is no measure for how far off it ended
 OFF_COUNTS, OFF_MOST = 0.2, 0.25  # of a way: what each chain of hops adds to what is usual, and how far off is too far
@@ -40,68 +38,114 @@ class Turned:
 
 @dataclass(frozen=True)
 class Hop:
-    """Where one began, how far it should go, how fast each axis was then, and can be; degrees, levels.
+    """Where one began, by which parts and how far it should go, how fast each axis was then, and can be.
 
-    `turned`: what pan and tilt did before, where the hop is the first one.
+    `parts` as the readings count, of pan and tilt; the others in degrees and levels. `turned`: what pan and tilt did
+    before, where the hop is the first one.
     """
 
     begun: Pose
+    parts: tuple[float, float]
     ways: Pose
     speeds: Pose
     tops: Pose
     turned: tuple[Turned, Turned] | None
 
 
-def angle(part: float, whole: float) -> float:
-    """How far a part of the scale goes, degrees."""
-    return degrees(atan(part * whole))
+def zooms(form: RelativeForm) -> str:
+    """What is honoured where its hops take zoom along."""
+    return f"{form} zoom"
 
 
-def learn(skill: Skill, hops: Sequence[Hop], to: Pose, limits: Limits, reading: Reading) -> None:
+def learn(skill: Skill, form: RelativeForm, hops: Sequence[Hop], to: Pose, limits: Limits, reading: Reading) -> None:
     """Where a chain of hops led: whether the form is honoured, with zoom or without, and how large its scale is."""
     there = limits.pose(reading)
-    if skill.honours.get(FORM) != "yes":
+    if skill.honours.get(form) != "yes":
         moved = max(abs(there[axis] - hops[0].begun[axis]) for axis in (PAN, TILT))
-        skill.honours[FORM] = "no" if moved < STAYED_DEG < max(map(abs, hops[0].ways[:ZOOM])) else "yes"
-    zoomed = abs(reading.zoom - to[ZOOM]) <= LEVEL
-    if ZOOMS not in skill.honours and max(abs(hop.ways[ZOOM]) for hop in hops) >= LEVEL:
-        skill.honours[ZOOMS] = "yes" if zoomed else "no"
-    skill.zoomed = (reading.zoom, to[ZOOM]) if zoomed else None
-    if skill.honours[FORM] == "yes":
-        _weigh(skill, hops, to, there)
+        skill.honours[form] = "no" if moved < STAYED_DEG < max(map(abs, hops[0].ways[:ZOOM])) else "yes"
+    if zooms(form) not in skill.honours:
+        _see_zoom(skill, form, hops[0].begun[ZOOM], to[ZOOM], reading.zoom)
+    skill.zoomed = (reading.zoom, to[ZOOM]) if abs(reading.zoom - to[ZOOM]) <= LEVEL else None
+    if skill.honours[form] == "yes":
+        wrong = (there[PAN] - to[PAN], there[TILT] - to[TILT])
+        _weigh(skill, form, hops, to, wrong)
         for axis in (PAN, TILT):
             low, high = limits.ranges[axis]
             if low + EDGE_DEG < there[axis] < high - EDGE_DEG:
-                _learn(skill, axis, hops, there[axis] - to[axis])
+                _learn(skill, form, axis, hops, wrong[axis])
 
 
-def _weigh(skill: Skill, hops: Sequence[Hop], to: Pose, there: Pose) -> None:
-    """A form whose hops go on ending elsewhere means something else by its parts: it is given up."""
-    way = max(abs(to[axis] - hops[0].begun[axis]) for axis in (PAN, TILT))
-    off = max(abs(there[axis] - to[axis]) for axis in (PAN, TILT))
-    skill.hops_off += OFF_COUNTS * (min(1.0, off / max(FAR_DEG, way)) - skill.hops_off)
-    if skill.hops_off > OFF_MOST:
-        skill.honours[FORM] = "no"
+def _see_zoom(skill: Skill, form: RelativeForm, begun: float, to: float, reading: float) -> None:
+    """Whether hops take zoom along, where its coarse readings, of before and of now, tell."""
+    asked, came, left = abs(to - begun), abs(reading - begun), abs(reading - to)
+    if asked >= 2 * LEVEL and left < came:
+        skill.honours[zooms(form)] = "yes"
+    elif asked > 3 * LEVEL and came <= LEVEL:
+        skill.honours[zooms(form)] = "no"
 
 
-def _learn(skill: Skill, axis: int, hops: Sequence[Hop], wrong: float) -> None:
+def unsure(scale: Scale, hops: Sequence[Hop]) -> float:
+    """How far from where it should the end of a chain may be, degrees: one standard deviation."""
+    told = [_told(scale.planes, axis, hops) for axis in (PAN, TILT)]
+    return max(sqrt(one.doubt**2 + one.noise**2 + one.before**2 - READ_DEG**2) for one in told)
+
+
+def _weigh(skill: Skill, form: RelativeForm, hops: Sequence[Hop], to: Pose, wrong: tuple[float, float]) -> None:
+    """A form whose hops go on ending where no law would is given up: its parts mean something else."""
+    scale, axes = skill.scales[form], (PAN, TILT)
+    way = max(abs(to[axis] - hops[0].begun[axis]) for axis in axes)
+    off = min(max(_told(law, axis, hops).off(wrong[axis]) for axis in axes) for law in scale.laws)
+    scale.off += OFF_COUNTS * (min(1.0, off / max(FAR_DEG, way)) - scale.off)
+    if scale.off > OFF_MOST:
+        skill.honours[form] = "no"
+
+
+def _learn(skill: Skill, form: RelativeForm, axis: int, hops: Sequence[Hop], wrong: float) -> None:
     """It ended so far from where it should: by the scale, or by where the first hop began."""
-    skill.planes.age()
-    slope, noise, share, counts = np.zeros_like(skill.planes.mean), READ_DEG, 1.0, 1.0
+    believed = skill.scales[form].planes
+    turned = hops[0].turned
+    for planes in skill.scales[form].laws:
+        planes.age()
+        told = _told(planes, axis, hops)
+        planes.learn(told.slope, wrong - told.beside, hypot(told.noise, told.before))
+        if planes is believed and turned is not None and turned[axis].told and told.share > SHARE:
+            travel = hops[0].begun[axis] + wrong / told.share - turned[axis].origin
+            noise = ALIKE * hypot(told.noise, told.doubt) / told.share
+            seen = Seen(turned[axis].answered, turned[axis].late, travel, noise, acts=True)
+            skill.paces[axis].learn(turned[axis].told, seen)
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What the end of a chain tells of a law: how that changes with the law's numbers, and its noise.
+
+    `doubt`: that of the law; `share`: how much of where the first hop began is left in it; `before`: what doubt of
+    that is; `beside`: how far from what was believed the law would have ended.
+    """
+
+    slope: Vector
+    doubt: float
+    noise: float
+    share: float
+    before: float
+    beside: float
+
+    def off(self, wrong: float) -> float:
+        """How far off the law, where what was believed was wrong by so much; degrees that no doubt explains."""
+        return max(0.0, abs(wrong - self.beside) - self.before - ALIKE * self.doubt)
+
+
+def _told(planes: Planes, axis: int, hops: Sequence[Hop]) -> _Told:
+    slope, noise, share, counts, beside = np.zeros_like(planes.mean), READ_DEG, 1.0, 1.0, 0.0
     for hop in reversed(hops):
         share = counts
-        bends = share * degrees(sin(2 * radians(hop.ways[axis]))) / 2  # degrees, for a change of the logarithm by 1
-        slope += bends * skill.planes.weights(axis, hop.begun[ZOOM])
+        way = planes.angle(axis, hop.parts[axis], hop.begun[ZOOM])
+        bends = share * planes.bends(way)
+        beside += share * (way - hop.ways[axis])
+        slope += bends * planes.weights(axis, hop.begun[ZOOM])
         noise = hypot(noise, share * TIME_S * hop.speeds[axis])
         if hop.speeds[ZOOM]:
-            noise = hypot(noise, bends * LEVELS * growth(hop.begun[ZOOM]))
+            noise = hypot(noise, bends * LEVELS * planes.growth(hop.begun[ZOOM]))
         counts *= max(0.0, 1.0 - abs(hop.speeds[axis]) / hop.tops[axis])  # in full flight it matters not where to
-    turned, scale = hops[0].turned, skill.planes.doubt(slope)
-    if turned is None:
-        skill.planes.learn(slope, wrong, noise)
-        return
-    skill.planes.learn(slope, wrong, hypot(noise, ALIKE * share * turned[axis].doubt))
-    if turned[axis].told and share > SHARE:
-        travel = hops[0].begun[axis] + wrong / share - turned[axis].origin
-        seen = Seen(turned[axis].answered, turned[axis].late, travel, ALIKE * hypot(noise, scale) / share, acts=True)
-        skill.paces[axis].learn(turned[axis].told, seen)
+    before = 0.0 if hops[0].turned is None else ALIKE * share * hops[0].turned[axis].doubt
+    return _Told(slope, planes.doubt(slope), noise, share, before, beside)

@@ -11,8 +11,9 @@ from statistics import median
 from typing import Literal
 
 from services.camera.ptz.pace import PAN_RATES, READ_LATE, TILT_RATES, ZOOM_RATES, Pace
-from services.camera.ptz.planes import Planes
+from services.camera.ptz.planes import POINT, TURN, VIEW, Scale, scale_of
 
+RelativeForm = Literal["moveRelatively", "Position"]
 Honours = Literal["unknown", "no", "pan", "yes"]  # of a way to let the firmware drive; pan: it ignores tilt
 DRIVES = (45.0, 27.0, 4.0)  # degrees/s, levels/s: the firmware's own moves, a guess to begin with
 KEEP = 120  # answers, for how long they take
@@ -25,6 +26,14 @@ NEAR_DEG, NEARER_DEG = 0.42, 0.35  # a reading so near has arrived: 0.5 promised
 STILL_DEG = 0.05
 STEADY = 6  # readings at rest that were alike show that they do not dither
 GRIDS = (2.0, 1.0)  # some firmware tells zoom in coarse steps
+
+
+def _scales() -> dict[RelativeForm, Scale]:
+    """The relative forms, the one that may go farther first; of both their source tells little.
+
+    moveRelatively is taken for the like of moveAbsolutely, whose share of 1 is half a turn; Position for the picture's.
+    """
+    return {"moveRelatively": scale_of(TURN, VIEW, POINT), "Position": scale_of(POINT, VIEW, TURN)}
 
 
 @dataclass
@@ -78,6 +87,7 @@ class Skill:
     steady: int = 0  # readings of an axis at rest that were alike; -1: two were not, they dither
     always_moving: bool = False  # it says that it moves while it rests
     says_moving: bool = False  # it was seen to say so at all
+    says_late: bool = False  # and when its position was the last one already: what it says is no newer than that
     zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
     drives: tuple[Pace, Pace, Pace] = field(default_factory=lambda: tuple(Pace((top,)) for top in DRIVES))  # type: ignore[assignment]
@@ -85,8 +95,7 @@ class Skill:
     honours: dict[str, Honours] = field(default_factory=dict)  # by form
     beside: dict[str, tuple[float, float]] = field(default_factory=dict)  # by form: pan and tilt off what was asked
     presets: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # readings where each was seen to be
-    planes: Planes = field(default_factory=Planes)  # of the relative form
-    hops_off: float = 0.0  # how far from where they should its hops end, over their way
+    scales: dict[RelativeForm, Scale] = field(default_factory=_scales)
 
     def timed(self, seconds: float) -> None:
         """An answer took so long; what is usual may change with it, and what was learnt against that stays as true."""
@@ -101,6 +110,12 @@ class Skill:
         self.senses[0].sign, self.senses[0].sure = (1 if mirror else -1), False
         self.senses[1].sign, self.senses[1].sure = (1 if flip else -1), False
 
+    def believe(self, *, absolute: bool | None, relative: bool | None) -> None:
+        """What the camera says that it does not take is not tried; what it says that it takes is tried all the same."""
+        for form, takes in (("moveAbsolutely", absolute), ("moveRelatively", relative)):
+            if takes is False:
+                self.honours.setdefault(form, "no")
+
     @property
     def read_late(self) -> float:
         """How long after it was asked for a reading tells of, as is learnt; not of a time after its usual answer."""
@@ -114,6 +129,10 @@ class Skill:
     def tells_rest(self, moving: bool | None) -> bool:
         """Whether what the camera says of its motion tells by itself that it rests: its word was seen to change."""
         return moving is False and self.says_moving and not self.always_moving
+
+    def tells_end(self, moving: bool | None) -> bool:
+        """Whether it tells that the position beside it is the last one: what it says may be newer than that."""
+        return self.says_late and self.tells_rest(moving)
 
     def see_still(self, change: float) -> None:
         """Two readings of an axis at rest differ by so much."""

@@ -6,6 +6,7 @@ Not here: how to get there (`move.py`), who has the motors (`motors.py`).
 from __future__ import annotations
 
 from services.camera.bulletin import Bulletin
+from services.camera.capabilities import Abilities
 from services.camera.orders import GotoPlace, LookAt
 from services.camera.places import Places
 from services.camera.plan import Plan
@@ -23,8 +24,8 @@ FRESH_S = 2.0  # a reading as old as this still tells where a camera at rest loo
 class Trips:
     """The moves of one camera; `skill` is what they teach."""
 
-    def __init__(self, config: Config, bulletin: Bulletin, places: Places) -> None:
-        self.config, self.bulletin, self.places = config, bulletin, places
+    def __init__(self, config: Config, bulletin: Bulletin, places: Places, abilities: Abilities) -> None:
+        self.config, self.bulletin, self.places, self.abilities = config, bulletin, places, abilities
         self.kept = Kept(config.state, config.name)
         self.skill = Skill()
         self.skill.forget_senses(flip=config.picture.flip, mirror=config.picture.mirror)
@@ -51,6 +52,7 @@ class Trips:
 
     def plan(self, command: GotoPlace | LookAt, now: float) -> Plan[Arrival]:
         """The move; after it, it is known that the camera rests, and what was learnt is kept."""
+        self._believe()
         near, until = self.bulletin.at_rest(now, FRESH_S), now + self.config.move_timeout_s
         try:
             arrival = yield from goto(
@@ -63,12 +65,18 @@ class Trips:
 
     def calibrate(self) -> Plan[Arrival]:
         """Learns the motors on purpose."""
+        self._believe()
         try:
             arrival = yield from calibrate(self.config.limits, self.skill)
         finally:
             self.kept.save(self.skill)
         self.bulletin.rests(arrival.reading, arrival.at)
         return arrival
+
+    def _believe(self) -> None:
+        told = self.abilities.present
+        if told is not None:
+            self.skill.believe(absolute=told.absolute, relative=told.relative)
 
     def _presets(self) -> dict[int, Pose]:
         """Where the camera's presets look, as the places say."""

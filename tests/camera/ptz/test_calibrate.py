@@ -9,7 +9,6 @@ import pytest
 from services.camera.ptz.calibrate import calibrate
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.kept import recalled
-from services.camera.ptz.scale import FORM
 from services.camera.ptz.skill import Skill
 from tests.camera.flat import Flat
 from tests.camera.motors import PAN, Motors, drive
@@ -53,8 +52,8 @@ def test_parts_of_the_picture_are_known_at_every_zoom_afterwards_where_the_firmw
     skill.forget_senses(flip=True, mirror=True)
     run, _ = drive(calibrate(limits, skill), motors, limit_s=300.0)
     assert run.error is None
-    assert skill.honours[FORM] == "yes"
-    planes = skill.planes
+    assert skill.honours["Position"] == "yes"
+    planes = skill.scales["Position"].planes
     doubts = [planes.doubt(planes.weights(axis, zoom)) for axis in (0, 1) for zoom in (0.0, 4.0, 8.0)]
     assert max(doubts) < 0.1  # of the part; 0.5 before
     assert motors.pushed == 0.0

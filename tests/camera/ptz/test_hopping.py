@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import random
 from statistics import median
+from typing import Literal
 
 import pytest
 
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
-from services.camera.ptz.scale import ZOOMS
-from services.camera.ptz.skill import Skill
-from services.camera.requests import MoveOver
+from services.camera.ptz.planes import POINT, TURN, VIEW, Law
+from services.camera.ptz.scale import Hop, learn, zooms
+from services.camera.ptz.skill import RelativeForm, Skill
+from services.camera.requests import MoveOver, Reading
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.track import Moment, Rail, go
 from tests.camera.goals import Rig, random_goals
@@ -52,9 +54,38 @@ def test_a_relative_form_is_found_and_its_scale_learnt_whatever_that_is(mirror: 
     assert not motors.pushed
 
 
+@pytest.mark.parametrize("form", ["Position", "moveRelatively"])
+@pytest.mark.parametrize(("parts", "law"), [("picture", POINT), ("view", VIEW), ("turn", TURN)])
+@pytest.mark.parametrize("seed", range(3))
+def test_what_the_parts_of_a_form_are_of_shows_by_where_hops_lead(
+    form: RelativeForm, parts: Literal["picture", "view", "turn"], law: Law, seed: int
+) -> None:
+    motors, skill, now = Motors(relative=parts, relative_form=form, acceleration=90.0, seed=seed), Skill(), 1000.0
+    motors.now = now
+    for pan, tilt, zoom in random_goals(20, seed):
+        run, took = drive(goto(LIMITS.goal(pan, tilt, zoom), LIMITS, skill, now + 60.0), motors, now=now)
+        now += took
+        assert run.error is None
+        assert abs(LIMITS.unwrap(motors.pose[0]) - LIMITS.unwrap(pan)) <= 0.5
+        assert abs(motors.pose[1] - tilt) <= 0.5
+    assert skill.honours[form] == "yes"
+    assert skill.scales[form].planes.law is law
+    assert not motors.pushed
+
+
+def test_a_camera_that_goes_by_shares_of_half_a_turn_is_mostly_there_after_one_hop_and_a_look() -> None:
+    rig = Rig(PROFILES["sd1a-2019"])
+    for goal in random_goals(12, 5):
+        rig.go(goal)
+    found = [rig.go(goal) for goal in random_goals(12, 6)]
+    assert all(one.off <= 0.5 and one.rests and not one.pushed for one in found)
+    assert median(one.commands for one in found) <= 3
+    assert median(one.ratio for one in found) <= 1.3
+
+
 @pytest.mark.parametrize("seed", range(6))
-def test_a_relative_form_whose_parts_are_of_something_else_is_given_up(seed: int) -> None:
-    motors, skill, now = Motors(relative="turn", acceleration=90.0, seed=seed), Skill(), 1000.0
+def test_a_form_whose_parts_are_of_places_and_no_way_on_is_given_up(seed: int) -> None:
+    motors, skill, now = Motors(relative="place", acceleration=90.0, seed=seed), Skill(), 1000.0
     motors.now = now
     for pan, tilt, zoom in random_goals(12, seed):
         run, took = drive(goto(LIMITS.goal(pan, tilt, zoom), LIMITS, skill, now + 60.0), motors, now=now)
@@ -80,7 +111,7 @@ def test_zoom_turns_with_pan_and_tilt_from_the_beginning_where_it_takes_as_long(
 def test_where_hops_leave_zoom_as_it_is_none_is_made_for_zoom_alone() -> None:
     motors, skill, now = Motors(relative="picture", acceleration=90.0), Skill(), 1000.0
     motors.now = now
-    skill.honours[ZOOMS] = "no"
+    skill.honours[zooms("Position")] = "no"
     for pan, tilt, zoom in [*random_goals(6, 3), *[(100.0, 40.0, zoom) for zoom in (0.0, 4.0, 8.0, 2.0)]]:
         motors.sent.clear()
         run, took = drive(goto(LIMITS.goal(pan, tilt, zoom), LIMITS, skill, now + 60.0), motors, now=now)
@@ -89,3 +120,18 @@ def test_where_hops_leave_zoom_as_it_is_none_is_made_for_zoom_alone() -> None:
     assert skill.honours["Position"] == "yes"
     assert motors.sent
     assert not any(isinstance(request, MoveOver) for request in motors.sent)
+
+
+@pytest.mark.parametrize(
+    ("asked", "reading", "said"),
+    [(4.03, 6.0, None), (2.0, 2.0, "yes"), (2.0, 6.0, "no"), (0.0, 0.0, "yes"), (5.0, 6.0, None)],
+)
+def test_whether_hops_take_zoom_along_is_not_believed_before_its_coarse_readings_tell(
+    asked: float, reading: float, said: str | None
+) -> None:
+    """From 6, as it read, it may have been 7 as well: at 5 it would still read 6."""
+    skill, still = Skill(), (0.0, 0.0, 0.0)
+    skill.honours["Position"] = "yes"
+    hop = Hop((10.0, 10.0, 6.0), (0.1, 0.0), (5.7, 0.0, asked - 6.0), still, (45.0, 27.0, 4.0), None)
+    learn(skill, "Position", [hop], (15.7, 10.0, asked), LIMITS, Reading(15.7, 10.0, reading, False))
+    assert skill.honours.get(zooms("Position")) == said

@@ -10,7 +10,7 @@ from statistics import median
 import pytest
 
 from services.camera.ptz.kept import Kept
-from services.camera.ptz.planes import LEVELS, Planes
+from services.camera.ptz.planes import LEVELS, POINT, TURN, Planes
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Identity
 from services.simulators.camera.firmwares import PROFILES
@@ -62,20 +62,26 @@ def test_on_long_ways_the_scale_is_told_from_the_place_where_a_hop_began(seed: i
     lens = rig.camera.lens
     halves = lens.width / (2 * lens.fx), lens.height / (2 * lens.fy)
     levels = (0.0, 2.0, 4.0, 6.0, 8.0)
-    known = [rig.skill.planes.at(zoom)[axis] * magnification(zoom) / halves[axis] for zoom in levels for axis in (0, 1)]
+    planes = rig.skill.scales["Position"].planes
+    assert planes.law is POINT
+    known = [planes.at(zoom)[axis] * magnification(zoom) / halves[axis] for zoom in levels for axis in (0, 1)]
     assert median(abs(one - 1.0) for one in known) < 0.03
     assert max(abs(one - 1.0) for one in known) < 0.08
 
 
 def test_what_was_learnt_of_it_is_kept(tmp_path: Path) -> None:
     identity, skill, again = Identity("M", "S1", "V1"), Skill(), Skill()
-    seen(skill.planes, 0, 0.0, 1.3)
+    point, _, turn = skill.scales["Position"].laws
+    seen(point, 0, 0.0, 1.3)
+    turn.likely = 5.0
     kept = Kept(tmp_path, "ip1")
     kept.recall(identity, skill)
     kept.save(skill)
     Kept(tmp_path, "ip1").recall(identity, again)
-    assert again.planes.at(4.0) == pytest.approx(skill.planes.at(4.0))
-    assert again.planes.doubt(again.planes.weights(0, 0.0)) < 0.1
+    known = again.scales["Position"].laws[0]
+    assert known.at(4.0) == pytest.approx(point.at(4.0))
+    assert known.doubt(known.weights(0, 0.0)) < 0.1
+    assert again.scales["Position"].planes.law is TURN
 
 
 @pytest.mark.parametrize("late", range(2, 7))

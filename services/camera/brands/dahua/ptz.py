@@ -65,8 +65,8 @@ def move_over(request: MoveOver, channel: int) -> str:
     if request.form == "Position":
         over = (round(request.right * PLANE), round(request.down * PLANE), round(request.zoom, 2))
         return ptz("start", "Position", channel, over)
-    zoom = round(request.zoom / ZOOM_LEVELS, 6)
-    return _plain("moveRelatively", channel, (round(request.right, 6), round(request.down, 6), zoom))
+    shares = (request.right, request.down, request.zoom / ZOOM_LEVELS)  # the camera refuses more than the whole
+    return _plain("moveRelatively", channel, tuple(round(min(1.0, max(-1.0, share)), 6) for share in shares))
 
 
 def _plain(action: str, channel: int, arguments: tuple[float, ...]) -> str:
