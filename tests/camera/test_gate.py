@@ -158,6 +158,21 @@ def test_a_camera_that_refuses_good_logins_at_random_is_not_taken_for_a_wrong_pa
     assert visitors.get() == 200
 
 
+def test_where_a_good_login_was_ever_refused_two_refusals_prove_nothing_and_three_do() -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    visitors.get()
+    camera.odd = 1
+    visitors.get()
+    visitors.now += 3600.0
+    camera.odd = 2  # both with a new nonce
+    assert visitors.get("events") == 200
+    visitors.now += 3600.0
+    camera.password = "changed"
+    assert visitors.outcome("pictures") is BadLogin
+    assert camera.failed == 3
+
+
 def test_after_a_random_refusal_a_password_change_is_still_found_out() -> None:
     camera = Camera()
     visitors = Visitors(camera)
