@@ -59,7 +59,9 @@ class Upkeep:
         self._due: dict[Callable[[], Plan[float]], float] = {
             self._look_at_clock: 0.0,
             self._look_at_storage: 0.0,
-            self._look_at_settings: 0.0,
+            self._look_at_picture: 0.0,
+            self._look_at_privacy: 0.0,
+            self._look_at_contrast: 0.0,
         }
 
     def met(self) -> None:
@@ -110,12 +112,18 @@ class Upkeep:
         self.facts.complain("storage", f"its memory card: {card.state}" if "rror" in card.state else "")
         return STORAGE_EVERY_S
 
-    def _look_at_settings(self) -> Plan[float]:
+    def _look_at_picture(self) -> Plan[float]:
         reply = yield from attempt(GetPicture())
         if isinstance(reply.result, Picture):
             picture = reply.result
             self.facts.values |= {"flip": _flag(picture.flip), "mirror": _flag(picture.mirror), "mode": picture.mode}
+        return SETTINGS_EVERY_S
+
+    def _look_at_privacy(self) -> Plan[float]:
         yield from self._note("privacy", GetPrivacy())
+        return SETTINGS_EVERY_S
+
+    def _look_at_contrast(self) -> Plan[float]:
         yield from self._note("contrast", GetContrast())
         return SETTINGS_EVERY_S
 
