@@ -31,7 +31,7 @@ from services.peers import mosquitto
 from services.runner import Runner
 from tests import footprint
 from tests.bridge import bench as bridge_bench
-from tests.camera import goal_figures, scan_figures
+from tests.camera import goal_figures, live_goals, scan_figures
 from tests.dashboard import bench as dashboard_bench
 from tests.mission import bench as mission_bench
 from tests.persistence import bench as writer_bench
@@ -208,6 +208,12 @@ def moves_part(_: Path, __: Size) -> Part:
     return goals_table(rows), [asdict(row) for row in rows]
 
 
+def live_moves_part(_: Path, __: Size) -> Part:
+    """The camera's goals in real time."""
+    rows = list(live_goals.rows())
+    return live_goals.table(rows), [asdict(row) for row in rows]
+
+
 def bridge_part(_: Path, __: Size) -> Part:
     """The bridge to ROS."""
     rows = list(bridge_bench.rows())
@@ -249,6 +255,7 @@ PARTS: dict[str, Callable[[Path, Size], Part]] = {
     "persistence": stored_part,
     "year": year_part,
     "moves": moves_part,
+    "live-moves": live_moves_part,
     "bridge": bridge_part,
     "scan": scan_part,
     "vision": vision_part,

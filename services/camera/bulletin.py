@@ -12,6 +12,7 @@ from services.bus import Message
 from services.camera.device import same
 from services.camera.health import Health
 from services.camera.places import Places
+from services.camera.ptz.stand import OVERRULES
 from services.camera.requests import Identity, Reading, Refused
 from services.camera.upkeep import Facts
 from services.camera.video.channel import Channel
@@ -20,6 +21,8 @@ from services.payloads import Diagnostic, Position, Stream
 
 EVERY_S = 1.0  # the diagnostics
 MOVING_S = 0.5  # the position while it changes
+FRESH_S = 3.0  # a camera at rest is asked every two seconds, and answers take their time
+LAST_BIT_DEG = 0.5  # a move is done where a reading is as near as that to its goal
 LEVELS = {"online": 0, "degraded": 1, "rebooting": 1}  # of diagnostic_msgs/DiagnosticStatus; all others 2
 
 log = logging.getLogger(__name__)
@@ -41,20 +44,24 @@ class Bulletin:
         self.identity: Identity | None = None
         self.video: Channel | None = None
         self._read_at = self._turned_at = 0.0
+        self._alike = 0  # readings in a row that were as the one before
+        self._arrived = False  # the newest reading is that of an arrival
         self._said: dict[topics.Topic, BaseModel] = {}
         self._position_at = 0.0
 
     def take(self, reading: Reading, at: float) -> None:
-        """A new reading from the camera."""
-        changed = self.reading is not None and not same(self.reading, reading)
-        self.turning = changed or reading.moving is True
+        """A new reading from the camera. The first one after an arrival may differ by the last bit of that way."""
+        changed = self.reading is not None and not same(self.reading, reading, LAST_BIT_DEG if self._arrived else 0.0)
+        self._alike = 0 if changed else self._alike + 1
+        self.turning = changed or (reading.moving is True and self._alike <= OVERRULES)
         if self.turning or self.reading is None:
             self._turned_at = at
-        self.reading, self._read_at = reading, at
+        self.reading, self._read_at, self._arrived = reading, at, False
 
     def rests(self, reading: Reading, at: float) -> None:
-        """It was seen to come to rest there, which one reading does not tell."""
-        self.turning, self.reading, self._read_at = False, reading, at
+        """It was seen to come to rest there, which one reading does not tell; nobody else has turned it."""
+        self.turning, self.reading, self._read_at, self._turned_at = False, reading, at, 0.0
+        self._alike, self._arrived = OVERRULES, True
 
     def known(self) -> Reading:
         """The newest reading; Refused when there is none."""
@@ -62,9 +69,9 @@ class Bulletin:
             raise Refused("the camera has not told its position yet")
         return self.reading
 
-    def at_rest(self, now: float, age_s: float) -> Reading | None:
-        """The newest reading when it is of a camera at rest and not older than that."""
-        return self.reading if not self.turning and now - self._read_at <= age_s else None
+    def at_rest(self, now: float) -> Reading | None:
+        """The newest reading when it is of a camera at rest and still tells where it looks."""
+        return self.reading if not self.turning and now - self._read_at <= FRESH_S else None
 
     def still_for(self, now: float) -> float:
         """How many seconds the camera has stood still, as far as its readings tell."""

@@ -247,7 +247,10 @@ def stand_still(
     return False
 
 
-def same(one: Reading, other: Reading) -> bool:
-    """Whether two readings show a camera at rest (it repeats a value, or dithers by 0.1 degree)."""
-    pan = abs((one.pan - other.pan + 180) % 360 - 180)
-    return pan < STILL_DEG and abs(one.tilt - other.tilt) < STILL_DEG and abs(one.zoom - other.zoom) < STILL_DEG
+def same(one: Reading, other: Reading, about: float = 0.0) -> bool:
+    """Whether two readings show a camera at rest (it repeats a value, or dithers by 0.1 degree).
+
+    `about`: so many degrees of pan and tilt do not count.
+    """
+    pan, tilt = abs((one.pan - other.pan + 180) % 360 - 180), abs(one.tilt - other.tilt)
+    return max(pan, tilt) < max(STILL_DEG, about) and abs(one.zoom - other.zoom) < STILL_DEG

@@ -164,15 +164,15 @@ def least_seconds(flat: SmallFlat) -> float:
 
 
 @contextmanager
-def watched(flat: SmallFlat) -> Iterator[list[float]]:
+def watched(flat: SmallFlat, stream: str = "MainFormat") -> Iterator[list[float]]:
     """At its end, the share of its frame rate that the simulator kept while the stream was open."""
-    share, before, began = [0.0], _frames(flat), time.monotonic()
+    share, before, began = [0.0], _frames(flat, stream), time.monotonic()
     yield share
-    share[0] = (_frames(flat) - before) / (FPS * max(0.1, time.monotonic() - began - OPENING_S))
+    share[0] = (_frames(flat, stream) - before) / (FPS * max(0.1, time.monotonic() - began - OPENING_S))
 
 
-def _frames(flat: SmallFlat) -> int:
-    return int(flat.doors["ip1"].state()["frames_rendered"]["MainFormat"])
+def _frames(flat: SmallFlat, stream: str) -> int:
+    return int(flat.doors["ip1"].state()["frames_rendered"][stream])
 
 
 def scanned(flat: SmallFlat, value: dict[str, Any]) -> tuple[ScanState, float]:

@@ -58,6 +58,47 @@ def test_forms_that_the_camera_says_it_does_not_take_are_not_tried(just_started:
     assert tried == {"PositionABS", "Position", *(("moveAbsolutely", "moveRelatively") if takes else ())}
 
 
+@pytest.fixture(params=["honest", "idle", "stuck", "nothing"])
+def saying(request: pytest.FixtureRequest, tmp_path: Path) -> Flat:
+    """What its firmware says of its motion is true, or one thing for ever, or nothing."""
+    (tmp_path / "preset_position.yaml").write_text(POSITIONS)
+    return Flat(
+        tmp_path, motors=Motors(says=request.param, absolute="full", acceleration=90.0, lag=0.3), places=Path()
+    ).online()
+
+
+def test_a_camera_that_stands_still_is_known_to_whatever_it_says(saying: Flat) -> None:
+    flat = saying
+    flat.run(5)
+    assert flat.payloads("position")[-1]["moving"] is False
+    flat.order("SaveAs", "Here")
+    flat.until(flat.ended)
+    assert flat.states() == LIFE
+
+
+def looks_before(flat: Flat, number: int) -> int:
+    """An order, carried out; how often the camera was looked at before it was told to turn."""
+    before = len(flat.motors.sent)
+    flat.order("Goto", ("Door", "Sofa", "Kitchen")[number % 3], order_id=str(number))
+    flat.until(lambda: any(isinstance(one, MoveTo) for one in flat.motors.sent[before:]))
+    looks = sum(isinstance(one, Status) for one in flat.motors.sent[before:])
+    flat.until(lambda: flat.ended(str(number)))
+    return looks
+
+
+def test_an_order_some_seconds_after_another_one_needs_no_reading_to_begin_with(saying: Flat) -> None:
+    for number in range(60):
+        assert looks_before(saying, number) <= 1 or number < 2  # the one that was on its way
+        assert saying.payloads("position")[-1]["moving"] is False
+        saying.run(1.5)  # between the first two looks after it
+
+
+def test_an_order_after_a_long_rest_needs_no_reading_to_begin_with(saying: Flat) -> None:
+    for number in range(12):
+        saying.run(20.0 + 0.2 * number)  # looks are two seconds apart there
+        assert looks_before(saying, number) <= 1
+
+
 def test_keys_and_place_names_are_matched_without_regard_to_case(flat: Flat) -> None:
     flat.order("gOtO", "kitchen")
     flat.until(flat.ended)

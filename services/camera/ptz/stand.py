@@ -14,6 +14,7 @@ from services.camera.requests import BadLogin, Direction, Locked, Reading, Refus
 from services.errors import DeviceError
 
 GAP_S = 0.45  # between two readings that are compared: the slowest speed shows in that time
+OVERRULES = 4  # readings in a row that are as the one before, whatever the camera says of its motion
 REFUSALS = 3
 GRACE_S = 1.0  # a timed move ends so much later than our stop, which is to end it
 LEAST_SHARE = 4  # of 100: less is ignored
@@ -25,14 +26,14 @@ LOCKED_PAUSE_S = 60.0  # a camera that takes no login takes no stop either, and 
 def settle(near: Reading | None = None) -> Plan[tuple[Reading, float]]:
     """Reads until two successive readings are equal and the camera does not say that it moves; the reading, the time.
 
-    Firmware exists that never leaves `Moving`: four equal readings overrule it.
+    Firmware exists that never leaves `Moving`: some equal readings overrule it.
     """
     last, equal = near, 0
     for _ in range(60):
         reply = yield from ask(Status())
         reading = cast(Reading, reply.result)
         equal = equal + 1 if last is not None and same(last, reading) else 0
-        if equal >= 4 or (equal >= 1 and reading.moving is not True):
+        if equal >= OVERRULES or (equal >= 1 and reading.moving is not True):
             return reading, reply.received
         last = reading
         if reply.received - reply.sent < GAP_S:

@@ -18,8 +18,6 @@ from services.camera.ptz.skill import Skill
 from services.camera.requests import Identity, Picture
 from services.camera.settings import Config
 
-FRESH_S = 2.0  # a reading as old as this still tells where a camera at rest looks
-
 
 class Trips:
     """The moves of one camera; `skill` is what they teach."""
@@ -53,7 +51,7 @@ class Trips:
     def plan(self, command: GotoPlace | LookAt, now: float) -> Plan[Arrival]:
         """The move; after it, it is known that the camera rests, and what was learnt is kept."""
         self._believe()
-        near, until = self.bulletin.at_rest(now, FRESH_S), now + self.config.move_timeout_s
+        near, until = self.bulletin.at_rest(now), now + self.config.move_timeout_s
         try:
             arrival = yield from goto(
                 self.goal(command), self.config.limits, self.skill, until, near=near, presets=self._presets()

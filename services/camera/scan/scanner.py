@@ -34,7 +34,6 @@ from services.memory import give_back
 from services.payloads import OrderState, Place, ScanResult, ScanState
 
 STATE_S = 0.5  # between two states of a scan that runs and finds nothing
-FRESH_S = 2.5  # a reading as old as this still tells where a camera at rest looks
 GATHER_S = 0.1  # between two looks whether frames have come
 RESTORE_S = 5.0  # between two tries to restore the picture
 
@@ -98,7 +97,7 @@ class Scanner:
             stop_early=self.config.stop_early and not order.full,
             second="always" if order.full else self.config.second_turn,
             mode=self.picture.mode,
-            near=self.bulletin.at_rest(now, FRESH_S),
+            near=self.bulletin.at_rest(now),
             slack=self.eye.slack_deg,
             move_timeout_s=self.config.move_timeout_s,
             likely=next(

@@ -1,0 +1,141 @@
+"""Random goals in real time: ordered over a real broker from `apartment run`, met by the simulated camera's HTTP.
+
+What a user would measure with a watch: from the order to `done`, with the service's own looks at the camera between
+its requests, and a picture that is watched meanwhile. In virtual time and without the service: `goals.py`.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from statistics import median
+from typing import Any
+
+import httpx
+from rich.table import Table
+
+from services.client import Client
+from services.payloads import Stream
+from services.simulators.camera.firmwares import PROFILES
+from tests.camera.goals import LIMITS, Goal, constants, random_goals, wanted
+from tests.camera.least_time import least_time
+from tests.camera.scan_figures import ENOUGH, watched
+from tests.small_flat import Door, small_flat
+
+FIRMWARES = ("ip3m-941w-2019", "ip4m-1051b-2019", "ip2m-841b-strict", "ip4m-1041b")
+GOALS = 20
+PAUSE_S = (0.3, 4.0)  # between two orders: people do not wait for the service's rhythm
+LIMIT_S = 90.0
+SUBSTREAM = "ExtraFormat"  # the one that the service hands on
+
+
+@dataclass
+class LiveRow:
+    """Goals on one firmware; `kept`: the share of its frame rate that the simulator kept meanwhile."""
+
+    firmware: str
+    goals: int
+    seconds: float
+    ratio: float
+    bound: float
+    off: float
+    pushed: float
+    failed: int
+    kept: float
+
+
+def rows(goals: int = GOALS, seed: int = 1) -> Iterator[LiveRow]:
+    """Each of FIRMWARES, from a cold start."""
+    for firmware in FIRMWARES:
+        with tempfile.TemporaryDirectory() as folder:
+            yield _row(firmware, Path(folder), random_goals(goals, seed), Random(seed))
+
+
+def _row(firmware: str, folder: Path, goals: list[Goal], rng: Random) -> LiveRow:
+    found: list[_Met] = []
+    with small_flat(folder, simulator={"profile": firmware}) as flat, flat.client("camera/ip1/#") as bus:
+        door = flat.doors["ip1"]
+        with shown(bus), watched(flat, SUBSTREAM) as kept:
+            for goal in goals:
+                bus.collect(rng.uniform(*PAUSE_S))
+                found.append(_met(bus, door, goal, firmware))
+        pushed = motors(door)["pushed_s"]
+    return LiveRow(
+        firmware=firmware,
+        goals=len(goals),
+        seconds=median(one.seconds for one in found),
+        ratio=median(one.seconds / one.least for one in found),
+        bound=wanted(PROFILES[firmware]),
+        off=max(one.off for one in found),
+        pushed=pushed["pan"] + pushed["tilt"],
+        failed=sum(one.state != "done" for one in found),
+        kept=kept[0],
+    )
+
+
+@contextmanager
+def shown(bus: Client) -> Iterator[None]:
+    """The camera's picture is looked at meanwhile."""
+    bus.order("ip1", "MJPEG", "ON")
+    stream: Stream = bus.payload("camera/ip1/stream", lambda stream: stream.mjpeg)
+    over = threading.Event()
+
+    def look() -> None:
+        with httpx.stream("GET", stream.url, timeout=30) as picture:
+            any(over.is_set() for _ in picture.iter_raw())
+
+    viewer = threading.Thread(target=look, name="viewer")
+    viewer.start()
+    try:
+        yield
+    finally:
+        over.set()
+        viewer.join()
+
+
+def motors(door: Door) -> Any:
+    """The constants of the simulated motors, and what they have done."""
+    return httpx.get(f"{door.url}/motors", timeout=30).json()
+
+
+@dataclass
+class _Met:
+    """One goal, and what became of it."""
+
+    state: str
+    seconds: float
+    least: float
+    off: float
+
+
+def _met(bus: Client, door: Door, goal: Goal, firmware: str) -> _Met:
+    """Orders it, and looks at the truth when its end is told."""
+    pose = door.state()["pose"]
+    least = least_time((pose["pan"], pose["tilt"], pose["zoom"]), goal, constants(PROFILES[firmware]))
+    bus.forget()
+    began = time.monotonic()
+    bus.say("camera/ip1/position/set", json.dumps(dict(zip(("pan", "tilt", "zoom"), goal, strict=True))))
+    ended = bus.payload("camera/ip1/order_result", lambda result: result.final, LIMIT_S)
+    seconds = time.monotonic() - began
+    truth = door.state()
+    there, moving = truth["pose"], truth["moving"]
+    off = max(abs(LIMITS.unwrap(there["pan"]) - LIMITS.unwrap(goal[0])), abs(there["tilt"] - goal[1]))
+    return _Met("moving" if moving else ended.state, seconds, least, off)
+
+
+def table(found: list[LiveRow]) -> Table:
+    """For people."""
+    title = f"random goals in real time, from order to answer; counts where {ENOUGH:.0%} of the frame rate was kept"
+    columns = "firmware", "goals", "median s", "over the least time", "wanted", "worst off", "pushed", "failed", "kept"
+    shown = Table(*columns, title=title)
+    for row in found:
+        shown.add_row(row.firmware, str(row.goals), f"{row.seconds:.1f}", f"{row.ratio:.2f}", f"<= {row.bound}",
+                      f"{row.off:.2f} deg", f"{row.pushed:.1f} s", str(row.failed), f"{row.kept:.0%}")  # fmt: skip
+    return shown
