@@ -46,6 +46,16 @@ def test_motion_that_goes_on_when_the_service_comes_is_seen(tmp_path: Path, came
         here.until(lambda: [one["value"] for one in here.payloads("motion")] == [1], 5)
 
 
+def test_motion_is_told_by_firmware_that_wants_brackets_encoded(tmp_path: Path) -> None:
+    with (
+        simulator(latency_s=0.02, switches={"brackets": "encoded"}) as camera,
+        bench(tmp_path, camera, motion=QUICK) as here,
+    ):
+        here.until(lambda: here.service.motion.fact == "attached", 10)
+        here.tell("event", code="VideoMotion", action="Start")
+        here.until(lambda: value(here) == 1, 3)
+
+
 def test_a_broken_connection_is_made_again_and_what_was_missed_is_asked_for(here: Bench) -> None:
     here.tell("drop")
     here.until(lambda: here.service.motion.reconnects == 1, 5)

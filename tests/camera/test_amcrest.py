@@ -98,6 +98,35 @@ def test_a_stop_of_unknown_motion_stops_every_code_although_some_are_refused() -
     assert len(web.asked) == len(Direction)
 
 
+def test_where_firmware_refuses_plain_brackets_they_are_encoded_from_then_on() -> None:
+    web = Web()
+    table = "table.VideoInOptions[0].DayNightColor=1\r\ntable.VideoInOptions[0].Flip=true\r\n"
+    table += "table.VideoInOptions[0].Mirror=false\r\n"
+
+    def answer(target: str) -> httpx.Response:
+        if "[" in target:
+            return httpx.Response(400, text="Error\r\nBad Request!\r\n")
+        return httpx.Response(200, text=table if "getConfig" in target else "OK\r\n")
+
+    web.answer = answer
+    client = camera(web)
+    assert client.send(SetPicture(flip=True)) == Picture(True, False, "auto")
+    assert ["[" in target for target in web.asked[:2]] == [True, False]
+    before = len(web.asked)
+    client.send(SetPicture(flip=True))
+    assert not any("[" in target for target in web.asked[before:])
+
+
+def test_what_is_refused_with_brackets_either_way_is_refused() -> None:
+    web = Web()
+    web.answer = lambda target: httpx.Response(400, text="Error\r\nBad Request!\r\n")
+    client = camera(web)
+    for _ in range(2):
+        with pytest.raises(Refused, match="400"):
+            client.send(SetPicture(flip=True))
+    assert ["[" in target for target in web.asked] == [True, False, True, False]
+
+
 def test_brackets_go_out_as_they_are() -> None:
     web = Web()
     with pytest.raises(Refused):

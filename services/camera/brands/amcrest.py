@@ -33,7 +33,7 @@ from services.camera.requests import (
     TurnFor,
 )
 from services.camera.sound.desk import Sound
-from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch
+from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch, respelt
 from services.camera.web.dahua import DahuaEar, DahuaSound
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
@@ -55,6 +55,7 @@ class Amcrest:
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
         self.running: str | None = None  # the code of the motion that may be under way
+        self._encodes = False  # brackets; most firmware reads them as they are
         self._in_day_night: bool | None = None  # the firmware keeps the mode in VideoInDayNight; None: not known yet
 
     def close(self) -> None:
@@ -92,7 +93,19 @@ class Amcrest:
                 return self._talk(errands.dialogue(request))
 
     def _get(self, target: str, timeout: httpx.Timeout = COMMAND) -> httpx.Response:
-        return replies.check(fetch(self.http, target, timeout))
+        """A refusal may be for how the brackets are spelt: the other way is tried, and kept where that is taken."""
+        spelt = respelt(target) if self._encodes else target
+        try:
+            return replies.check(fetch(self.http, spelt, timeout))
+        except Refused as refused:
+            if "[" not in target:
+                raise
+            try:
+                answer = replies.check(fetch(self.http, respelt(spelt), timeout))
+            except Refused:
+                raise refused from None
+            self._encodes = not self._encodes
+            return answer
 
     def _command(self, target: str, timeout: httpx.Timeout = COMMAND) -> object:
         body = self._get(target, timeout).text

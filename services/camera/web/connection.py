@@ -31,3 +31,10 @@ def fetch(http: httpx.Client, target: str, timeout: httpx.Timeout = COMMAND) -> 
                 "no answer from the camera: it refuses connections, is starting again or has no web server on"
             ) from error
         raise Away(f"no answer from the camera: {type(error).__name__} {error}".strip()) from error
+
+
+def respelt(target: str) -> str:
+    """The same with its brackets encoded, or plain again: firmware disagrees about how it reads them."""
+    if "[" in target:
+        return target.replace("[", "%5B").replace("]", "%5D")
+    return target.replace("%5B", "[").replace("%5D", "]")

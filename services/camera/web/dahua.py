@@ -15,7 +15,7 @@ from services.camera.address import Address
 from services.camera.brands.dahua import events, replies, system
 from services.camera.requests import Away, Event, Refused
 from services.camera.sound import g711
-from services.camera.web.connection import connection, fetch
+from services.camera.web.connection import connection, fetch, respelt
 from services.camera.web.digest import Login, header, read_challenge
 from services.camera.web.endless import Endless
 from services.camera.web.gate import Gate
@@ -36,9 +36,13 @@ class DahuaEar:
         self._target = events.attach(codes, heartbeat_s)
 
     def listen(self) -> Iterator[list[Event]]:
-        """See `Ear`."""
+        """See `Ear`. After a refusal the next attempt spells its brackets the other way."""
         with self._endless.open(self._target) as (response, pieces):
-            _must_be_endless(response)
+            try:
+                _must_be_endless(response)
+            except Refused:
+                self._target = respelt(self._target)
+                raise
             parser = events.Parser(events.boundary(response.headers.get("content-type", "")))
             yield []
             for piece in pieces:
