@@ -58,9 +58,9 @@ class Bulletin:
             self._turned_at = at
         self.reading, self._read_at, self._arrived = reading, at, False
 
-    def rests(self, reading: Reading, at: float) -> None:
-        """It was seen to come to rest there, which one reading does not tell; nobody else has turned it."""
-        self.turning, self.reading, self._read_at, self._turned_at = False, reading, at, 0.0
+    def rests(self) -> None:
+        """It was seen to come to rest after an order, which its newest reading alone does not tell."""
+        self.turning, self._turned_at = False, 0.0
         self._alike, self._arrived = OVERRULES, True
 
     def known(self) -> Reading:

@@ -47,6 +47,14 @@ BROKER_LOST = "the connection to the broker was lost"
 FREE = WITHOUT_CAMERA | orders.Halt | orders.EndScan  # can be done while the camera is away,
 IN_TURN = orders.Broadcast | orders.EndScan  # these not before what came earlier
 STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
+TOPICS = (
+    topics.CAMERA_ORDER,
+    topics.CAMERA_POSITION_SET,
+    topics.CAMERA_SNAPSHOT_GET,
+    topics.CAMERA_MARKER,
+    topics.HOMEASSISTANT_ENTITY,
+    topics.HOMEASSISTANT_STATUS,
+)
 
 
 class CameraService:
@@ -66,18 +74,7 @@ class CameraService:
         hears: bool = False,
     ) -> None:
         self.config = config
-        self.subscribes = tuple(
-            topic.filter_for(cam=config.name)
-            for topic in (
-                topics.CAMERA_ORDER,
-                topics.CAMERA_POSITION_SET,
-                topics.CAMERA_SNAPSHOT_GET,
-                topics.CAMERA_MARKER,
-                topics.HOMEASSISTANT_ENTITY,
-                topics.HOMEASSISTANT_STATUS,
-            )
-        )
-        self.subscribes += (LOST_TOPIC,)
+        self.subscribes = (*(topic.filter_for(cam=config.name) for topic in TOPICS), LOST_TOPIC)
         self.due: float | None = 0.0
         self.counters: dict[str, int] = {"requests": 0, "failed_requests": 0, "frames": 0}
         self._out: list[Message] = []
@@ -292,6 +289,8 @@ class CameraService:
         return self.trips.plan(command, now)
 
     def _motor_ended(self, job: Job, state: OrderState, error: str | None, now: float) -> None:
+        if state == "done":
+            self.bulletin.rests()
         if isinstance(job.command, ScanFor):
             self.scanner.ended(state, error, now)
 

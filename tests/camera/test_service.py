@@ -71,9 +71,11 @@ def test_a_camera_that_stands_still_is_known_to_whatever_it_says(saying: Flat) -
     flat = saying
     flat.run(5)
     assert flat.payloads("position")[-1]["moving"] is False
-    flat.order("SaveAs", "Here")
-    flat.until(flat.ended)
-    assert flat.states() == LIFE
+    for number, (key, order) in enumerate([("SaveAs", "Here"), ("Move", "Left 3 0.5"), ("Goto", "Here"), ("Zoom", 4)]):
+        flat.order(key, order, order_id=str(number))
+        flat.until(lambda number=number: flat.ended(str(number)))  # type: ignore[misc]
+        assert flat.states(str(number)) == LIFE
+        assert flat.last(str(number))["position"]["moving"] is False
 
 
 def looks_before(flat: Flat, number: int) -> int:

@@ -49,27 +49,22 @@ class Trips:
         return self.config.limits.goal(pan, tilt, zoom)
 
     def plan(self, command: GotoPlace | LookAt, now: float) -> Plan[Arrival]:
-        """The move; after it, it is known that the camera rests, and what was learnt is kept."""
+        """The move; what it taught is kept."""
         self._believe()
         near, until = self.bulletin.at_rest(now), now + self.config.move_timeout_s
+        goal, limits, presets = self.goal(command), self.config.limits, self._presets()
         try:
-            arrival = yield from goto(
-                self.goal(command), self.config.limits, self.skill, until, near=near, presets=self._presets()
-            )
+            return (yield from goto(goal, limits, self.skill, until, near=near, presets=presets))
         finally:
             self.kept.save(self.skill)
-        self.bulletin.rests(arrival.reading, arrival.at)
-        return arrival
 
     def calibrate(self) -> Plan[Arrival]:
         """Learns the motors on purpose."""
         self._believe()
         try:
-            arrival = yield from calibrate(self.config.limits, self.skill)
+            return (yield from calibrate(self.config.limits, self.skill))
         finally:
             self.kept.save(self.skill)
-        self.bulletin.rests(arrival.reading, arrival.at)
-        return arrival
 
     def _believe(self) -> None:
         told = self.abilities.present
