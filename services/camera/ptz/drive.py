@@ -110,14 +110,14 @@ def judge(skill: Skill, here: Pose, drive: Drive, there: Pose) -> None:
 
 
 def _judge_to(skill: Skill, here: Pose, drive: Drive, request: MoveTo, there: Pose) -> None:
-    """A first one that asked for hardly any tilt does not tell whether that is honoured."""
+    """A first one that asked for hardly any tilt, and stayed there, does not tell whether that is honoured."""
     off = tuple(there[axis] - drive.to[axis] for axis in (PAN, TILT))
     proven, asked = skill.honours.get(request.form) == "yes", abs(drive.to[TILT] - here[TILT])
     stayed = abs(there[TILT] - here[TILT]) < LEAST_DEG / 2
     if max(map(abs, off)) > BESIDE_DEG or (asked > LEAST_DEG and stayed):
         tilt_ignored = abs(off[PAN]) <= BESIDE_DEG and abs(there[TILT] - here[TILT]) < LEAST_DEG
         skill.honours[request.form] = "pan" if tilt_ignored else "no"
-    elif proven or asked > LEAST_DEG:
+    elif proven or not stayed:
         before = skill.beside.get(request.form, (0.0, 0.0))
         skill.honours[request.form] = "yes"
         skill.beside[request.form] = (before[PAN] + off[PAN], before[TILT] + off[TILT])

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import random
 from copy import deepcopy
+from typing import Literal
 
 import pytest
 
 from services.camera.ptz.course import ZOOM, Course
 from services.camera.ptz.drive import Drive, judge
 from services.camera.ptz.goal import Limits
+from services.camera.ptz.move import goto
 from services.camera.ptz.pace import PAN_RATES, Pace, Seen, Told
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Direction, MoveTo, Reading, Reply, Start, Status
+from tests.camera.motors import Motors, drive
 
 LIMITS = Limits()
 
@@ -72,6 +75,20 @@ def test_firmware_that_seemed_to_honour_tilt_is_found_out_when_it_stays() -> Non
     skill = Skill(honours={"PositionABS": "yes"})
     judge(skill, (10.0, 20.0, 0.0), Drive(MoveTo(40.0, 24.0, 0.0, "PositionABS"), (40.0, 24.0, 0.0)), (40.0, 20.0, 0.0))
     assert skill.honours["PositionABS"] == "pan"
+
+
+@pytest.mark.parametrize("says", ["honest", "idle"])
+def test_a_tilt_that_was_not_asked_for_shows_by_itself_that_firmware_goes_beside(
+    says: Literal["honest", "idle"],
+) -> None:
+    """The first goal may be for zoom alone: it was led there by start and stop, and so was each one after it."""
+    motors, skill = Motors(absolute="full", tilt_off=-2.0, acceleration=90.0, says=says), Skill()
+    run, took = drive(goto(LIMITS.goal(90.0, 20.0, 4.0), LIMITS, skill, 1060.0), motors)
+    assert run.error is None
+    assert took < 6.0
+    assert abs(motors.pose[1] - 20.0) <= 0.5
+    assert (skill.honours["PositionABS"], skill.beside["PositionABS"][1]) == ("yes", pytest.approx(-2.0, abs=0.2))
+    assert not any(isinstance(request, Start) for request in motors.sent)
 
 
 @pytest.mark.parametrize("faster", [0.6, 1.6])
