@@ -52,8 +52,8 @@ class Bulletin:
     def take(self, reading: Reading, at: float) -> None:
         """A new reading from the camera. The first one after an arrival may differ by the last bit of that way."""
         changed = self.reading is not None and not same(self.reading, reading, LAST_BIT_DEG if self._arrived else 0.0)
-        self._alike = 0 if changed else self._alike + 1
-        self.turning = changed or (reading.moving is True and self._alike <= OVERRULES)
+        self._alike = 0 if changed or self.reading is None else self._alike + 1
+        self.turning = changed or (reading.moving is True and self._alike < OVERRULES)
         if self.turning or self.reading is None:
             self._turned_at = at
         self.reading, self._read_at, self._arrived = reading, at, False

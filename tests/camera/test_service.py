@@ -78,6 +78,17 @@ def test_a_camera_that_stands_still_is_known_to_whatever_it_says(saying: Flat) -
         assert flat.last(str(number))["position"]["moving"] is False
 
 
+def test_a_stop_in_the_middle_of_a_motion_is_done_when_the_camera_is_known_to_rest(saying: Flat) -> None:
+    flat = saying
+    flat.order("Move", "Left 4 20", order_id="far")
+    flat.until(flat.started)
+    flat.run(2)
+    flat.order("Move", "Stop")
+    flat.until(flat.ended)
+    assert flat.last()["state"] == "done"
+    assert flat.last()["position"]["moving"] is False
+
+
 def looks_before(flat: Flat, number: int) -> int:
     """An order, carried out; how often the camera was looked at before it was told to turn."""
     before = len(flat.motors.sent)
