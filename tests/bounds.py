@@ -11,6 +11,7 @@ MEDIAN_PAN_ONLY = 2.05  # not 2.0 yet where a position is honoured but for its t
 MEDIAN_BESIDE = 2.0  # of start and stop from a preset that is up to PRESET_DEG beside the goal
 PRESET_DEG = 2.0
 COMMANDS = 12  # for a goal, answers to login challenges not counted
+CALIBRATED_WITHIN_COMMANDS = 0.98  # of the goals of a calibrated camera; two late answers in one move may cost more
 WITHIN_COMMANDS = 0.93  # of the goals at least; a first goal, or one with a late answer or two, takes more
 
 SCAN_OVER_LEAST = 1.3  # a full scan (both picture modes, K = 8) over the least time of motors, frames and one switch

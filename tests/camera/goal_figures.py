@@ -59,6 +59,10 @@ def rows() -> list[Row]:
     found = {name: outcomes(profile, goals, SEED) for name, profile in PROFILES.items()}
     bound = {name: wanted(profile) for name, profile in PROFILES.items()}
     ours = [_row(name, one, bound[name]) for name, one in found.items()]
+    ours += [
+        _row(f"{name}, calibrated", outcomes(profile, goals, SEED, calibrated=True), bound[name])
+        for name, profile in PROFILES.items()
+    ]
     few = _row(f"{COMPARED}, the first {THE_REPORT_S_GOALS}", found[COMPARED][:THE_REPORT_S_GOALS], bound[COMPARED])
     return [
         *ours,

@@ -18,6 +18,7 @@ from services.camera.address import Address
 from services.camera.brands.amcrest import Amcrest
 from services.camera.capabilities import Capabilities, GetCapabilities
 from services.camera.plan import Plan, Run, Stage
+from services.camera.ptz.calibrate import calibrate
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import Arrival, goto
 from services.camera.ptz.skill import Skill
@@ -124,6 +125,13 @@ class Rig:
             error=str(run.error) if run.error else None,
         )
 
+    def calibrate(self) -> None:
+        """What the order for it does, before any goal."""
+        run = self.drive(calibrate(LIMITS, self.skill))
+        assert run.error is None, run.error
+        self.near = cast(Arrival, run.result).reading
+        self.now += 1.0
+
     def truth(self) -> Goal:
         """Where the motors are."""
         pose = self.device.motion(self.now)[0]
@@ -184,9 +192,11 @@ def constants(profile: Profile) -> Constants:
     )
 
 
-def outcomes(profile: Profile, goals: Iterable[Goal], seed: int = 1) -> list[Outcome]:
-    """All goals one after the other, from a cold start; some time passes between two."""
+def outcomes(profile: Profile, goals: Iterable[Goal], seed: int = 1, *, calibrated: bool = False) -> list[Outcome]:
+    """All goals one after the other, some time between two: from a cold start, or after `apartment calibrate ptz`."""
     rig, found = Rig(profile, seed), []
+    if calibrated:
+        rig.calibrate()
     for goal in goals:
         found.append(rig.go(goal))
         rig.now += 1.0

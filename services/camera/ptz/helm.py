@@ -37,6 +37,7 @@ class Helm:
         pan, tilt = (min(high - EDGE_DEG, max(low + EDGE_DEG, value)) for value, (low, high) in ends)
         self.aim: Pose = (pan, tilt, goal.pose[ZOOM])
         self.commands = 0
+        self.turned: set[int] = {PAN, TILT}  # since it was last judged where they rest
         self.zoom_ends: float | None = None
         self.quiet = 0.0  # until then the firmware drives by itself
         self.rests = 0.0  # when it came to rest, as is reckoned
@@ -82,6 +83,7 @@ class Helm:
         request = Start(DIRECTIONS[(told[0], told[1], told[2])], pan or tilt or zoom, tilt or None)
         reply = yield from self.send(request)
         self.course.tell(reply, levels)
+        self.turned |= {axis for axis in (PAN, TILT) if levels[axis]}
         if not levels[ZOOM]:
             self.zoom_ends = None
         return reply

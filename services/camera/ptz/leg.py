@@ -125,4 +125,5 @@ def _judged(leg: Leg, outlook: Outlook, left: int, runs: dict[int, int]) -> Leg:
     correction += max((outlook.seconds(axis, miss, after) for axis, miss in misses.items()), default=0.0)
     arrives = prod(chances) if len(leg.parts) == len(ways) else 0.0
     cost = leg.held + (1 - arrives) * correction + (0.0 if leg.joint else COMMAND_S) - (COMMAND_S if running else 0.0)
+    cost += outlook.rung(left) if leg.feared else 0.0
     return replace(leg, cost=cost, chance=arrives)

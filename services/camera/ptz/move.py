@@ -28,6 +28,7 @@ from services.errors import DeviceError
 MOST_LEGS = 30  # the deadline ends most moves that do not come to an end
 STUCK = 3  # legs without effect
 MOVED = 0.15  # degrees or levels
+DITHER_DEG = 0.2  # two readings of an axis at rest differ by so much at most
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,7 @@ class Move:
                 driven = yield from self.hopping.hop(now)
             if driven is not None:
                 reading, now = driven
+                self.helm.turned = {PAN, TILT}
                 self._notice(before, self.helm.limits.pose(reading), out)
                 continue
             if {PAN, TILT} & set(out):
@@ -107,9 +109,14 @@ class Move:
         return reading, now
 
     def _out(self, reading: Reading) -> list[int]:
-        """The axes that are not where they should be; zoom only while it does not turn."""
-        pose = self.helm.limits.pose(reading)
-        out = [axis for axis in (PAN, TILT) if abs(self.helm.goal.pose[axis] - pose[axis]) > self.helm.near]
+        """The axes that are not where they should be; zoom only while it does not turn.
+
+        One that had arrived and was not turned since is not out because its reading dithers.
+        """
+        pose, dither = self.helm.limits.pose(reading), DITHER_DEG if self.helm.skill.dithers else 0.0
+        near = [self.helm.near + (0.0 if axis in self.helm.turned else dither) for axis in (PAN, TILT)]
+        out = [axis for axis in (PAN, TILT) if abs(self.helm.goal.pose[axis] - pose[axis]) > near[axis]]
+        self.helm.turned = set(out)
         if self.helm.zoom_ends is None and abs(self.helm.goal.pose[ZOOM] - pose[ZOOM]) > self.helm.zoom_near:
             out.append(ZOOM)
         return out

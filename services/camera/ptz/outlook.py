@@ -20,6 +20,8 @@ READ_ON_THE_WAY = 0.1
 CRAWL_DEG = 0.2  # so much of a goal may be given up for the fear of a late stop
 LEG = 3  # commands: a start, an end, a reading
 OVER_S = 15.0  # what it is worth to arrive with the commands that there are
+FEW = 8  # commands: with no more left than that, each is worth more, so
+RUNG_S = 1.1  # an end that comes early, for a slower leg to go on, has to save so much
 FINE = 6.0  # steps of distance in each factor of e
 
 
@@ -44,6 +46,15 @@ class Outlook:
     skill: Skill
     known: dict[tuple[int, int, int], float] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        paces = [way.pace for way in self.ways.values()]
+        learnt = all(2 * sum(map(pace.known, pace.speeds)) >= len(pace.speeds) for pace in paces)
+        self._thrifty = len(paces) > 1 and learnt  # one axis has commands enough, and what is not known is to be seen
+
+    def rung(self, left: int) -> float:
+        """What the command costs that ends a leg early and goes on slower, seconds; `left` commands with it."""
+        return RUNG_S if self._thrifty and left <= FEW else 0.0
+
     def seconds(self, axis: int, distance: float, left: int) -> float:
         """From rest at a distance (positive) until it is read to be there; `left` commands until then."""
         if distance <= self.ways[axis].near:
@@ -67,7 +78,7 @@ class Outlook:
         held = max(self.skill.timing.usual, held_for(way.pace, speed, distance - short))
         left -= 0 if way.pace.known(speed) else 1  # it will be looked at
         if short > way.near:
-            return held + self.seconds(axis, short, left - 1)
+            return held + self.rung(left) + self.seconds(axis, short, left - 1)
         spread = spread_of(way.pace, speed, held, self.skill)
         correction = CORRECTION_S * self.skill.timing.usual + self.seconds(axis, way.near + spread / 2, left - LEG)
         return held + (1 - chance(-short, spread, way.near)) * correction

@@ -126,6 +126,11 @@ class Skill:
         """As near as that a reading has arrived, degrees."""
         return NEAR_DEG if self.steady >= STEADY else NEARER_DEG
 
+    @property
+    def dithers(self) -> bool:
+        """Whether readings of an axis at rest were seen to differ."""
+        return self.steady < 0
+
     def tells_rest(self, moving: bool | None) -> bool:
         """Whether what the camera says of its motion tells by itself that it rests: its word was seen to change."""
         return moving is False and self.says_moving and not self.always_moving

@@ -16,6 +16,7 @@ from tests import bounds
 from tests.camera.goals import Outcome, Rig, outcomes, random_goals, wanted, with_presets
 
 SEEDS = range(1, 9)
+CALIBRATED_SEEDS = range(1, 5)
 BESIDE_DEG = 3.0
 
 
@@ -47,6 +48,20 @@ def test_a_goal_takes_few_commands(moved: tuple[str, list[Outcome]]) -> None:
     assert median(one.commands for one in found) <= bounds.COMMANDS - 2
     few = [one.commands <= bounds.COMMANDS for one in found]
     assert sum(few) >= bounds.WITHIN_COMMANDS * len(few)
+
+
+@pytest.mark.parametrize("name", sorted(PROFILES))
+def test_a_calibrated_camera_takes_few_commands_from_its_first_goal_on(name: str) -> None:
+    found = [
+        one
+        for seed in CALIBRATED_SEEDS
+        for one in outcomes(PROFILES[name], random_goals(bounds.GOALS, seed), seed, calibrated=True)
+    ]
+    assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
+    assert max(one.commands for one in found[: bounds.GOALS]) <= bounds.COMMANDS
+    few = [one.commands <= bounds.COMMANDS for one in found]
+    assert sum(few) >= bounds.CALIBRATED_WITHIN_COMMANDS * len(few)
+    assert median(one.ratio for one in found) <= wanted(PROFILES[name])
 
 
 def test_where_beside_the_goal_will_do_it_is_met_with_fewer_commands_and_sooner() -> None:

@@ -10,7 +10,7 @@ import pytest
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Refused, Start
+from services.camera.requests import Reading, Refused, Start
 from tests.camera.motors import Motors, drive
 
 LIMITS = Limits()
@@ -97,6 +97,17 @@ def test_zoom_is_reached_after_pan_and_tilt() -> None:
     run, _ = drive(goto(LIMITS.goal(80.0, 30.0, 4.0), LIMITS, Skill(), 1060.0), motors)
     assert run.error is None
     assert motors.reading().zoom == 4.0
+
+
+@pytest.mark.parametrize("seed", range(1, 13))
+def test_an_axis_that_had_arrived_is_not_turned_again_because_its_reading_dithers(seed: int) -> None:
+    motors, skill = Motors(dither=0.1, seed=seed), Skill(steady=-1)
+    for sense in skill.senses:
+        sense.sign, sense.sure = 1, True
+    begun = Reading(90.0, 20.0, 0.0, moving=False)  # 0.28 degrees from its goal, but it may read 0.38 the next time
+    run, _ = drive(goto(LIMITS.goal(60.0, 20.28, 0.0), LIMITS, skill, 1060.0, near=begun), motors)
+    assert run.error is None, run.error
+    assert {request.direction.value[1] for request in motors.sent if isinstance(request, Start)} == {0}
 
 
 def test_a_camera_that_does_not_turn_ends_with_the_reason() -> None:
