@@ -26,7 +26,7 @@ LEG_S = 1.5  # each leg turns so long, or less where there is less room
 ROOM = 0.3  # of the way to the end stop that a leg may use
 FIRST_MOVE_DEG = 12.0  # shows the signs, and what the firmware honours
 MOVE_S = 60.0
-PLACES = 10  # for the relative form: moves between them are long, and each goes to another zoom
+PLACES = 40  # for the relative form, whose scale they teach: some way from one to the next, and each at another zoom
 MARGIN = 0.15  # of a range, at either end, in which none of them lies
 
 
@@ -68,7 +68,7 @@ def _aside(limits: Limits, began: Goal) -> Goal:
 
 
 def _places(limits: Limits) -> Iterator[Goal]:
-    """All over the ranges, the next one always far from the last."""
+    """All over the ranges, each a step of both axes and of zoom from the last."""
     for number in range(PLACES):
         parts = [(step * number % PLACES) / (PLACES - 1) for step in (3, 7)]
         pan, tilt = (

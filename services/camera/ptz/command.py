@@ -19,7 +19,7 @@ from services.camera.ptz.kept import recalled
 from services.camera.ptz.skill import Skill
 from services.errors import ConfigError
 
-ASK = "May {} turn now? It turns every way for about two minutes, with every speed, and returns to where it looks."
+ASK = "May {} turn now? It turns every way for two to four minutes, with every speed, and returns to where it looks."
 
 
 def run(out: Console, camera: str, state: Path, order: Callable[[], bool], *, yes_move: bool) -> bool:
