@@ -185,6 +185,7 @@ MOVING = (
     "goal",
     "helm",
     "hopping",
+    "landing",
     "leg",
     "move",
     "pace",

@@ -58,8 +58,9 @@ class Bulletin:
             self._turned_at = at
         self.reading, self._read_at, self._arrived = reading, at, False
 
-    def rests(self) -> None:
-        """It was seen to come to rest after an order, which its newest reading alone does not tell."""
+    def rests(self, reading: Reading | None) -> None:
+        """It was seen to come to rest after an order, which its newest reading does not tell; `reading`: where."""
+        self.reading = reading or self.reading
         self.turning, self._turned_at = False, 0.0
         self._alike, self._arrived = OVERRULES, True
 

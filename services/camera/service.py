@@ -288,9 +288,9 @@ class CameraService:
         assert isinstance(command, GotoPlace | LookAt)
         return self.trips.plan(command, now)
 
-    def _motor_ended(self, job: Job, state: OrderState, error: str | None, now: float) -> None:
+    def _motor_ended(self, job: Job, state: OrderState, error: str | None, rest: Reading | None, now: float) -> None:
         if state == "done":
-            self.bulletin.rests()
+            self.bulletin.rests(rest)
         if isinstance(job.command, ScanFor):
             self.scanner.ended(state, error, now)
 

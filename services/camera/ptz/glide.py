@@ -37,6 +37,10 @@ class Glide:
         """When it rests."""
         return self.began + sum(seconds for seconds, _, _ in self._pieces())
 
+    def within(self, left: float) -> float:
+        """When no more than that is left of its way; not before it slows down for its goal."""
+        return max(self.brakes, self.ends - sqrt(2 * left / self.acceleration))
+
     @property
     def brakes(self) -> float:
         """When it begins to slow down for its goal."""

@@ -3,16 +3,18 @@
 A hop may begin while the last one, or a start at full speed, still turns. Where it leads depends on where the camera
 was just then: that is known when it was answered, not before, so the last hop of a long way leaves some degrees to
 one more that begins at rest. A late hop pushes nothing against a stop. Zoom turns by hops only, so where it takes
-long they begin sooner. Not here: how an axis glides (`glide.py`), how large the scale is (`planes.py`), what hops teach
+long they begin sooner. A look on the last bit of the way tells whether to go on from where that leads. Not here: how an
+axis glides (`glide.py`), where it will rest (`landing.py`), how large the scale is (`planes.py`), what hops teach
 (`scale.py`).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import cast
 
 from services.camera.plan import Plan, wait
-from services.camera.ptz import scale
+from services.camera.ptz import landing, scale
 from services.camera.ptz.course import PAN, TILT, ZOOM, ZOOM_SLOWS_S
 from services.camera.ptz.driving import at_rest
 from services.camera.ptz.glide import Glide
@@ -36,6 +38,7 @@ FAR_DEG = 360.0  # no hop goes farther
 TRY_DEG = 12.0  # a first hop, whose scale is a guess
 BULK = 1.5  # answers: a start at full speed that is shorter is not worth it
 LATE_LOOK = 2.0  # answers: a look as late as that does not delay what it is for
+RESTS_S = 0.02  # after it is reckoned to rest, where that was foretold
 FEW = 2  # commands, for a hop from rest and a look
 
 
@@ -49,6 +52,7 @@ class Hopping:
         self.zooms = False  # whether zoom is to change
         self.glides: list[Glide] = []
         self.hops: list[Hop] = []
+        self.foretold = 0.0  # degrees: doubt of where the hops began, where that was foretold
 
     def hop(self, now: float) -> Plan[tuple[Reading, float] | None]:
         """Goes to the goal, or near; None where the firmware has no such form, or it did not help."""
@@ -78,8 +82,11 @@ class Hopping:
         """A chain of hops, or one that is a try, to rest."""
         certain = self._honoured == "yes"
         self.turns += 1
-        self.glides, self.hops = [], []
+        self.glides, self.hops, self.foretold = [], [], 0.0
         now = yield from (self._chain(now) if certain else self._send(now, TRY_DEG))
+        landed = (yield from self._land(now)) if certain else None
+        if landed is not None:
+            return landed
         pan, tilt, zoom = self.glides
         to = (pan.goal, tilt.goal, zoom.goal)
         arrives = max(self._ends(), zoom.ends)
@@ -95,6 +102,36 @@ class Hopping:
         off = max(abs(self.helm.aim[axis] - to[axis]) for axis in (PAN, TILT))
         unsure = scale.unsure(self.helm.skill.scales[self.form], self.hops)
         return not self.helm.skill.says_late and off + 2 * unsure <= EXACT_DEG
+
+    def _land(self, now: float) -> Plan[tuple[Reading, float] | None]:
+        """Looks on the last bit of way, and hops on where that leads beside the goal; None: it is not sure where."""
+        helm = self.helm
+        while helm.left > 0:
+            doubts = landing.doubts(helm.skill, self.form, self.hops, self.foretold)
+            look = landing.sight(helm.skill, self.glides, doubts)
+            if look is None:
+                break
+            yield from wait(max(now, look))
+            reply = yield from helm.send(Status())
+            reading, now = cast(Reading, reply.result), reply.received
+            arrives = max(self._ends(), self.glides[ZOOM].ends)
+            ends = landing.ends(helm.skill, self.glides, doubts, reply, helm.limits.pose(reading))
+            zoomed = abs(helm.goal.pose[ZOOM] - reading.zoom) <= helm.zoom_near or not self._takes_zoom()
+            verdict = landing.judge(helm.aim, helm.near, ends) if zoomed else "unsure"
+            if verdict == "unsure":
+                break
+            landing.learn(helm.skill, self.form, self.hops, self.glides, helm.limits, reading, ends)
+            reading = landing.at_end(reading, ends)
+            helm.stand(reading)
+            helm.rests = arrives
+            if verdict == "there" or helm.left < FEW or not helm.beside(helm.limits.pose(reading)):
+                return reading, (yield from wait(max(now, arrives + RESTS_S)))
+            began = min(arrives, now)
+            for axis, end in enumerate(ends):
+                self.glides[axis] = replace(self.glides[axis], began=began, place=end.at, speed=0.0, goal=end.at)
+            self.hops, self.foretold = [], max(end.doubt for end in ends)
+            now = yield from self._send((yield from wait(max(now, arrives - helm.skill.timing.usual))))
+        return None
 
     @property
     def _honoured(self) -> str:

@@ -16,18 +16,18 @@ from services.camera.plan import Plan, Run, Stage
 from services.camera.ptz.move import Arrival
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import Hold, halt, stop
-from services.camera.requests import Refused
+from services.camera.requests import Reading, Refused
 from services.camera.scan.wish import ScanFor
 from services.payloads import OrderState
 
 STOP_LIMIT_S = 10.0  # a Stop order that is not confirmed by then has failed; the stopping goes on
 
 MakePlan = Callable[[Command, float], Plan[Any]]
-Ended = Callable[[Job, OrderState, str | None, float], None]
+Ended = Callable[[Job, OrderState, str | None, Reading | None, float], None]
 
 
 class Motors:
-    """The one that may start motions. `ended` hears of every order that had the motors."""
+    """The one that may start motions. `ended` hears of every order that had the motors, and where a move ended."""
 
     def __init__(self, stage: Stage, answers: Answers, make_plan: MakePlan, ended: Ended) -> None:
         self.stage = stage
@@ -129,14 +129,14 @@ class Motors:
             self._end("failed", str(run.error), now)
             self._halt(stop(now), now)
             return
-        arrival = run.result
-        self._end("done", None, now, clamped=isinstance(arrival, Arrival) and arrival.clamped)
+        self._end("done", None, now, run.result if isinstance(run.result, Arrival) else None)
 
-    def _end(self, state: OrderState, error: str | None, now: float, *, clamped: bool = False) -> None:
+    def _end(self, state: OrderState, error: str | None, now: float, arrival: Arrival | None = None) -> None:
         jobs, self.jobs, self.hold = self.jobs, [], None
+        rest = arrival.reading if arrival is not None else None
         for job in jobs:
-            self.ended(job, state, error, now)  # first: who hears that a scan is done has heard its results
-            self.answers.tell(job, state, error, clamped=clamped)
+            self.ended(job, state, error, rest, now)  # first: who hears that a scan is done has heard its results
+            self.answers.tell(job, state, error, clamped=arrival is not None and arrival.clamped)
 
     def _cancel(self, why: str, now: float) -> None:
         """Ends what runs or waits, with a stop where there may be motion."""

@@ -33,7 +33,11 @@ DITHER_DEG = 0.2  # two readings of an axis at rest differ by so much at most
 
 @dataclass(frozen=True)
 class Arrival:
-    """Where a move ended: verified, at rest. `rests` is since when, as far as that was reckoned; 0: it did not turn."""
+    """Where a move ended: read at rest, or on its last degree, where its end was foretold; `at`: it rests by then.
+
+    `reading` is that of the rest; where it was foretold nobody has told whether it moves. `rests` is since when, as far
+    as that was reckoned; 0: it did not turn.
+    """
 
     reading: Reading
     at: float

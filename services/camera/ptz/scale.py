@@ -57,8 +57,19 @@ def zooms(form: RelativeForm) -> str:
     return f"{form} zoom"
 
 
-def learn(skill: Skill, form: RelativeForm, hops: Sequence[Hop], to: Pose, limits: Limits, reading: Reading) -> None:
-    """Where a chain of hops led: whether the form is honoured, with zoom or without, and how large its scale is."""
+def learn(
+    skill: Skill,
+    form: RelativeForm,
+    hops: Sequence[Hop],
+    to: Pose,
+    limits: Limits,
+    reading: Reading,
+    read: float = READ_DEG,
+) -> None:
+    """Where a chain of hops led: whether the form is honoured, with zoom or without, and how large its scale is.
+
+    `read`: standard deviation of the reading, degrees.
+    """
     there = limits.pose(reading)
     if skill.honours.get(form) != "yes":
         moved = max(abs(there[axis] - hops[0].begun[axis]) for axis in (PAN, TILT))
@@ -68,11 +79,11 @@ def learn(skill: Skill, form: RelativeForm, hops: Sequence[Hop], to: Pose, limit
     skill.zoomed = (reading.zoom, to[ZOOM]) if abs(reading.zoom - to[ZOOM]) <= LEVEL else None
     if skill.honours[form] == "yes":
         wrong = (there[PAN] - to[PAN], there[TILT] - to[TILT])
-        _weigh(skill, form, hops, to, wrong)
+        _weigh(skill, form, hops, to, wrong, read)
         for axis in (PAN, TILT):
             low, high = limits.ranges[axis]
             if low + EDGE_DEG < there[axis] < high - EDGE_DEG:
-                _learn(skill, form, axis, hops, wrong[axis])
+                _learn(skill, form, axis, hops, wrong[axis], read)
 
 
 def _see_zoom(skill: Skill, form: RelativeForm, begun: float, to: float, reading: float) -> None:
@@ -90,23 +101,31 @@ def unsure(scale: Scale, hops: Sequence[Hop]) -> float:
     return max(sqrt(one.doubt**2 + one.noise**2 + one.before**2 - READ_DEG**2) for one in told)
 
 
-def _weigh(skill: Skill, form: RelativeForm, hops: Sequence[Hop], to: Pose, wrong: tuple[float, float]) -> None:
+def doubts(scale: Scale, hops: Sequence[Hop], axis: int) -> tuple[float, float]:
+    """Standard deviations of the end of a chain, degrees: because of its hops, because of where the first one began."""
+    told = _told(scale.planes, axis, hops, 0.0)
+    return hypot(told.doubt, told.noise), told.before
+
+
+def _weigh(
+    skill: Skill, form: RelativeForm, hops: Sequence[Hop], to: Pose, wrong: tuple[float, float], read: float
+) -> None:
     """A form whose hops go on ending where no law would is given up: its parts mean something else."""
     scale, axes = skill.scales[form], (PAN, TILT)
     way = max(abs(to[axis] - hops[0].begun[axis]) for axis in axes)
-    off = min(max(_told(law, axis, hops).off(wrong[axis]) for axis in axes) for law in scale.laws)
+    off = min(max(_told(law, axis, hops, read).off(wrong[axis]) for axis in axes) for law in scale.laws)
     scale.off += OFF_COUNTS * (min(1.0, off / max(FAR_DEG, way)) - scale.off)
     if scale.off > OFF_MOST:
         skill.honours[form] = "no"
 
 
-def _learn(skill: Skill, form: RelativeForm, axis: int, hops: Sequence[Hop], wrong: float) -> None:
+def _learn(skill: Skill, form: RelativeForm, axis: int, hops: Sequence[Hop], wrong: float, read: float) -> None:
     """It ended so far from where it should: by the scale, or by where the first hop began."""
     believed = skill.scales[form].planes
     turned = hops[0].turned
     for planes in skill.scales[form].laws:
         planes.age()
-        told = _told(planes, axis, hops)
+        told = _told(planes, axis, hops, read)
         planes.learn(told.slope, wrong - told.beside, hypot(told.noise, told.before))
         if planes is believed and turned is not None and turned[axis].told and told.share > SHARE:
             travel = hops[0].begun[axis] + wrong / told.share - turned[axis].origin
@@ -135,8 +154,8 @@ class _Told:
         return max(0.0, abs(wrong - self.beside) - self.before - ALIKE * self.doubt)
 
 
-def _told(planes: Planes, axis: int, hops: Sequence[Hop]) -> _Told:
-    slope, noise, share, counts, beside = np.zeros_like(planes.mean), READ_DEG, 1.0, 1.0, 0.0
+def _told(planes: Planes, axis: int, hops: Sequence[Hop], read: float = READ_DEG) -> _Told:
+    slope, noise, share, counts, beside = np.zeros_like(planes.mean), read, 1.0, 1.0, 0.0
     for hop in reversed(hops):
         share = counts
         way = planes.angle(axis, hop.parts[axis], hop.begun[ZOOM])

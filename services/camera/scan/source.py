@@ -122,8 +122,8 @@ class Source:
             plan.close()
 
     def reckon(self, rests: float) -> None:
-        """The motion was reckoned to end a little before it was read to rest: so it did."""
-        if 0.0 < self.rested - rests < RECKONED_S:
+        """The motion was reckoned to end a little before it was read to rest, or after it was read last: so it did."""
+        if rests and self.rested - rests < RECKONED_S:
             self.rested = rests
 
     def expose(self, spot: Spot, now: float) -> Plan[float]:

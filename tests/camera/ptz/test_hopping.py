@@ -14,7 +14,7 @@ from services.camera.ptz.move import goto
 from services.camera.ptz.planes import POINT, TURN, VIEW, Law
 from services.camera.ptz.scale import Hop, learn, zooms
 from services.camera.ptz.skill import RelativeForm, Skill
-from services.camera.requests import MoveOver, Reading
+from services.camera.requests import MoveOver, Reading, Request, Status
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.track import Moment, Rail, go
 from tests.camera.goals import Rig, random_goals
@@ -33,6 +33,17 @@ def test_an_axis_glides_as_a_motor_with_its_top_speed_and_acceleration_does(turn
     for step in range(1, 10):
         at = track.ends * step / 9
         assert glide.at(at) == pytest.approx(tuple(track.at(at)), abs=1e-6)
+
+
+@pytest.mark.parametrize("turn", range(20))
+def test_when_so_much_of_its_way_is_left_is_told_of_its_braking(turn: int) -> None:
+    rng = random.Random(turn)
+    way = rng.choice((-1, 1)) * rng.uniform(1, 60)
+    glide = Glide(5.0, 10.0, 0.0, 10.0 + way, 45.0, 120.0, 0.0)
+    for left in (0.0, 0.1, 0.3):
+        assert abs(glide.goal - glide.at(glide.within(left))[0]) == pytest.approx(left, abs=1e-6)
+    assert glide.within(abs(way)) == glide.brakes > glide.began
+    assert Glide(5.0, 10.0, 0.0, 10.0, 45.0, 120.0, 0.0).within(0.1) == 5.0
 
 
 @pytest.mark.parametrize("mirror", [True, False])
@@ -81,6 +92,25 @@ def test_a_camera_that_goes_by_shares_of_half_a_turn_is_mostly_there_after_one_h
     assert all(one.off <= 0.5 and one.rests and not one.pushed for one in found)
     assert median(one.commands for one in found) <= 3
     assert median(one.ratio for one in found) <= 1.3
+
+
+def test_a_look_on_the_last_bit_of_the_way_is_mostly_enough_and_every_goal_is_met() -> None:
+    rig = Rig(PROFILES["ip2m-841b-strict"])
+    asked: list[Request] = []
+    rig.log = lambda reply: asked.append(reply.request)
+    foretold = 0
+    for number, goal in enumerate(random_goals(40, 1)):
+        asked.clear()
+        outcome = rig.go(goal)
+        assert outcome.error is None
+        assert outcome.rests
+        assert outcome.off <= 0.5
+        if number >= 20:
+            assert rig.near is not None
+            once = not isinstance(asked[-2], Status)
+            foretold += once and rig.near.moving is None  # no reading is like that: this firmware says whether it moves
+        rig.now += 1.0
+    assert foretold > 10
 
 
 @pytest.mark.parametrize("seed", range(6))

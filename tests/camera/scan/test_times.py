@@ -8,7 +8,9 @@ from statistics import mean
 
 import pytest
 
+from services.camera.ptz.skill import Skill
 from services.camera.scan.search import Scan
+from services.camera.scan.source import Source
 from services.simulators.camera.motors import Pose
 from tests import bounds
 from tests.camera.scan.virtual_scan import VirtualScan, virtual_scan
@@ -55,6 +57,18 @@ def test_a_frame_is_placed_by_a_reading_at_rest(trial: VirtualScan) -> None:
     for spot, pose in zip(scan.spots, truth.values(), strict=True):
         assert spot.reading.pan == pytest.approx(pose.pan, abs=0.051)
         assert spot.reading.tilt == pytest.approx(pose.tilt, abs=0.051)
+
+
+@pytest.mark.parametrize(
+    ("read", "reckoned", "rested"),
+    [(10.0, 9.5, 9.5), (10.0, 8.0, 10.0), (10.0, 10.1, 10.1), (10.0, 0.0, 10.0)],
+    ids=["read at rest", "reckoned badly", "read on its last bit of way", "it did not turn"],
+)
+def test_frames_count_from_when_a_motion_was_reckoned_to_end(read: float, reckoned: float, rested: float) -> None:
+    source = Source(None, Skill(), None)
+    source.rested = read
+    source.reckon(reckoned)
+    assert source.rested == rested
 
 
 def test_a_place_that_was_saved_zoomed_is_shown_whole_and_costs_no_correction(trial: VirtualScan) -> None:

@@ -1,0 +1,183 @@
+"""Where an axis that the firmware drives will rest, told by a look on the last bit of its way. Pure.
+
+A look tells of the moment when it was asked for and is answered a while later: asked for at rest it costs that time,
+asked for while the camera brakes the camera rests when the answer comes. Where it will rest is then reckoned, from how
+far off its course the look shows it: on its last degree little else is possible. Not here: the looks and hops
+themselves (`hopping.py`), how far off the end of a chain of hops may be (`scale.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import hypot
+from typing import Literal, cast
+
+from services.camera.ptz import scale
+from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.glide import Glide
+from services.camera.ptz.goal import Limits, Pose
+from services.camera.ptz.pace import HALF_CHANGE, READ_LATE, READ_PART
+from services.camera.ptz.scale import Hop
+from services.camera.ptz.skill import NEAR_DEG, RelativeForm, Skill
+from services.camera.requests import Reading, Reply
+
+# When to look.
+LEFT_DEG = (1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, when the look is of: the earliest that tells enough
+LEFT_LEVELS = 0.3  # of zoom's way, at most, where it is told in coarse steps
+EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
+EXPECTED_NOISE_DEG = 0.25  # and whose own noise is no more
+LATER = 0.3  # of the spread of answers: a look is so much later, so that a quick one is not before its time
+
+# What is known without a look, and how exact one is; standard deviations.
+BELIEVED = 0.35  # of the doubt that is kept of a hop's scale and place: large, so that they go on learning
+LEAST_DEG = 0.05  # of where hops lead
+READ_DEG = 0.06  # of a reading
+LEAST_S = 0.004  # of the moment that a look tells of
+STEP_DEG = 0.05  # of the goal: what it would change of a look
+LEAST_SHOWN = 0.1  # of a change of the goal; before it brakes a look shows none
+UNSEEN = 0.5  # of the doubt of the goal is noise of a look that shows nothing of the goal
+BENT = 0.3  # of how far off it ends: the reckoning of that may be wrong by so much
+
+# What follows from it.
+SURE = 2.0  # standard deviations that it may end farther off than is likeliest, to have arrived
+MISSED = 1.25  # and nearer, for a hop to go on from there: one too many does little harm
+OUTLIER = 2.0  # of them; a look farther off its course than that is of something else
+ARRIVES_DEG = 0.45  # it ends at its goal if it ends so near at the worst: 0.5 is promised
+NOISE_DEG = 0.4  # a look whose noise is more does not tell that
+GO_ON_DEG = 0.25  # doubt of where it ends, up to which a hop goes on from there
+TEACHES = 0.5  # of the doubt before it: a look that leaves less tells how far hops went
+
+Verdict = Literal["there", "beside", "unsure"]
+
+
+@dataclass(frozen=True)
+class Doubts:
+    """What is not known of an axis on its way, standard deviations.
+
+    `goal`: how far it was to go, degrees; `place`: where that began, degrees, and then all of its way is beside;
+    `read`: a reading, degrees; `time`: the moment that it tells of, seconds; `change`: its acceleration, a share.
+    """
+
+    goal: float
+    place: float
+    read: float
+    time: float
+    change: float
+
+    @property
+    def end(self) -> float:
+        """Where it will rest, degrees."""
+        return hypot(self.goal, self.place)
+
+
+@dataclass(frozen=True)
+class End:
+    """Where an axis will rest, degrees.
+
+    `doubt`: standard deviation of `at`, and `before`: what that was before the look; `seen`: where it will rest by the
+    look alone, and `noise`: standard deviation of that; `odd`: the look is too far off for a motion as was reckoned.
+    """
+
+    at: float
+    doubt: float
+    before: float
+    seen: float
+    noise: float
+    odd: bool = False
+
+
+def doubts(skill: Skill, form: RelativeForm, hops: Sequence[Hop], place: float) -> tuple[Doubts, Doubts]:
+    """Those of pan and tilt on the way of a chain of hops; `place`: of where it began, beside what the hops tell."""
+    reads = skill.paces[PAN]
+    time = hypot(reads.other_doubt(READ_LATE), reads.other_doubt(READ_PART) * skill.timing.spread / 2, LEAST_S)
+
+    def of(axis: int) -> Doubts:
+        goal, before = scale.doubts(skill.scales[form], hops, axis)
+        change = skill.paces[axis].other_doubt(HALF_CHANGE) / skill.paces[axis].other(HALF_CHANGE)
+        return Doubts(hypot(BELIEVED * goal, LEAST_DEG), hypot(BELIEVED * before, place), READ_DEG, time, change)
+
+    return of(PAN), of(TILT)
+
+
+def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> float | None:
+    """When to ask for a look that tells where pan and tilt will rest, the earliest; None: no look would."""
+    turning = glides[:ZOOM]
+    zoomed = glides[ZOOM].within(LEFT_LEVELS if skill.zoom_grid else 0.0)
+    for left in LEFT_DEG:
+        when = max(zoomed, *(glide.within(left) for glide in turning))
+        told = [foretell(glide, when, glide.at(when)[0], known[axis]) for axis, glide in enumerate(turning)]
+        if all(end.doubt <= EXPECTED_DOUBT_DEG and end.noise <= EXPECTED_NOISE_DEG for end in told):
+            return when - skill.read_late + LATER * skill.timing.spread
+    return None
+
+
+def foretell(glide: Glide, seen: float, place: float, known: Doubts) -> End:
+    """The end of a glide that was seen at a place, at a time: the likeliest, of two things that may have been off."""
+    reckoned, speed = glide.at(seen)
+    other, _ = replace(glide, goal=glide.goal + (STEP_DEG if glide.goal >= reckoned else -STEP_DEG)).at(seen)
+    shown = abs(other - reckoned) / STEP_DEG
+    noise = hypot(known.read, known.time * speed, known.change * (glide.goal - reckoned))
+    wrong, bends = place - reckoned, 1.0 / max(LEAST_SHOWN, shown) - 1.0
+    before = known.end
+    odd = wrong**2 > OUTLIER**2 * (before**2 + noise**2)
+    # As a place that was off it ends as far off as it is seen; as a goal that was off, farther: it is halfway between.
+    off = wrong * (1 + bends / 2)
+    noise = hypot(noise * (1 + bends / 2), wrong * bends / 2, UNSEEN * bends * known.goal)
+    spread = hypot(before, noise)
+    at = glide.goal + (before / spread) ** 2 * off
+    return End(at, hypot(before * noise / spread, BENT * off), before, glide.goal + off, noise, odd)
+
+
+def read(place: float, known: Doubts) -> End:
+    """The end of an axis that was read at rest."""
+    return End(place, known.read, known.end, place, known.read)
+
+
+def ends(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts], reply: Reply, pose: Pose) -> list[End]:
+    """The ends of pan and tilt by the answer to a look, whose reading is `pose`; odd where it rests too soon."""
+    seen = skill.paces[PAN].seen_at(reply.sent, reply.received - reply.sent - skill.timing.usual)
+    says_rest = skill.tells_rest(cast(Reading, reply.result).moving)
+    if says_rest and seen >= max(glide.ends for glide in glides):
+        return [read(pose[axis], known[axis]) for axis in (PAN, TILT)]
+    told = [foretell(glides[axis], seen, pose[axis], known[axis]) for axis in (PAN, TILT)]
+    return [replace(end, odd=end.odd or says_rest) for end in told]
+
+
+def judge(aim: Pose, near: float, told: Sequence[End]) -> Verdict:
+    """Whether pan and tilt will surely rest at the goal, or surely beside it, farther off than `near`."""
+    off = [abs(aim[axis] - end.at) for axis, end in enumerate(told)]
+    most = max(one + SURE * end.doubt for one, end in zip(off, told, strict=True))
+    least = max(one - MISSED * end.doubt for one, end in zip(off, told, strict=True))
+    seen = max(abs(aim[axis] - end.seen) for axis, end in enumerate(told))
+    if any(end.odd for end in told):
+        return "unsure"
+    if most <= ARRIVES_DEG and seen <= NEAR_DEG and all(end.noise <= NOISE_DEG for end in told):
+        return "there"
+    if least > near and all(end.doubt < GO_ON_DEG for end in told):
+        return "beside"
+    return "unsure"
+
+
+def learn(
+    skill: Skill,
+    form: RelativeForm,
+    hops: Sequence[Hop],
+    glides: Sequence[Glide],
+    limits: Limits,
+    reading: Reading,
+    told: Sequence[End],
+) -> None:
+    """What is foretold teaches, too, where the look tells how far hops went, and not only that it went as reckoned."""
+    pan, tilt, zoom = (glide.goal for glide in glides)
+    if all(end.doubt < TEACHES * end.before for end in told):
+        there = replace(reading, pan=told[PAN].at, tilt=told[TILT].at)
+        noise = max(scale.READ_DEG, *(end.doubt for end in told))
+        scale.learn(skill, form, hops, (pan, tilt, zoom), limits, there, noise)
+    else:
+        skill.zoomed = (reading.zoom, zoom) if abs(reading.zoom - zoom) <= scale.LEVEL else None
+
+
+def at_end(reading: Reading, told: Sequence[End]) -> Reading:
+    """The reading as it will be at rest; whether it moves then nobody has told."""
+    return replace(reading, pan=round(told[PAN].at % 360.0, 2), tilt=round(told[TILT].at, 2), moving=None)

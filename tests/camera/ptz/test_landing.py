@@ -1,0 +1,105 @@
+"""Where an axis will rest, told by a look on the last bit of its way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import isfinite
+
+import pytest
+
+from services.camera.ptz.glide import Glide
+from services.camera.ptz.goal import Pose
+from services.camera.ptz.landing import Doubts, End, at_end, ends, foretell, judge, read
+from services.camera.ptz.skill import Skill
+from services.camera.requests import Reading, Reply, Status
+
+WAY = Glide(began=0.0, place=10.0, speed=0.0, goal=40.0, top=45.0, acceleration=90.0, answered=0.0)
+KNOWN = Doubts(goal=0.2, place=0.0, read=0.06, time=0.005, change=0.02)
+LATE = WAY.within(0.3)  # most of the braking is done then
+AIM: Pose = (40.0, 20.0, 0.0)
+STANDS = read(20.0, KNOWN)
+
+
+def test_a_look_that_is_as_was_reckoned_leaves_the_goal_and_little_doubt() -> None:
+    end = foretell(WAY, LATE, WAY.at(LATE)[0], KNOWN)
+    assert end.at == pytest.approx(40.0)
+    assert end.seen == pytest.approx(40.0)
+    assert end.before == 0.2
+    assert 0.06 < end.doubt < 0.15
+    assert not end.odd
+
+
+@pytest.mark.parametrize("off", [-0.3, 0.3])
+def test_what_is_off_its_course_on_its_last_bit_ends_as_far_off(off: float) -> None:
+    sure = foretell(WAY, LATE, WAY.at(LATE)[0], KNOWN)
+    end = foretell(WAY, LATE, WAY.at(LATE)[0] + off, KNOWN)
+    assert 0.5 * abs(off) < abs(end.at - 40.0) < 1.2 * abs(off)
+    assert (end.at - 40.0) * off > 0
+    assert end.seen - 40.0 == pytest.approx(off, rel=0.3)
+    assert end.doubt > sure.doubt
+
+
+def test_the_farther_its_goal_was_in_doubt_the_more_a_look_is_believed() -> None:
+    ends = [foretell(WAY, LATE, WAY.at(LATE)[0] + 0.2, replace(KNOWN, goal=goal)).at for goal in (0.05, 0.2, 0.8)]
+    assert ends == sorted(ends)
+    assert ends[0] < 40.1 < ends[2]
+
+
+def test_before_it_brakes_a_look_tells_little_of_the_goal() -> None:
+    early = WAY.brakes - 0.02
+    end = foretell(WAY, early, WAY.at(early)[0], KNOWN)
+    assert end.doubt == pytest.approx(end.before, rel=0.05)
+    beside = foretell(WAY, early, WAY.at(early)[0] + 0.1, KNOWN)
+    assert abs(beside.at - 40.0) < 0.1
+
+
+def test_a_look_that_is_too_far_off_is_odd_unless_so_much_was_in_doubt() -> None:
+    place = WAY.at(LATE)[0] + 1.0
+    assert foretell(WAY, LATE, place, KNOWN).odd
+    assert not foretell(WAY, LATE, place, replace(KNOWN, goal=1.0)).odd
+    assert not foretell(WAY, LATE, place, replace(KNOWN, place=1.0)).odd
+
+
+@pytest.mark.parametrize("way", [0.0, 1e-9, -1e-9, -30.0])
+def test_an_axis_that_hardly_goes_or_is_at_its_goal_has_an_end(way: float) -> None:
+    glide = replace(WAY, goal=WAY.place + way)
+    for when in (glide.began, glide.within(0.1), glide.ends, glide.ends + 1.0):
+        end = foretell(glide, when, glide.at(when)[0], KNOWN)
+        assert all(map(isfinite, (end.at, end.doubt, end.before, end.seen, end.noise)))
+        assert end.at == pytest.approx(glide.goal, abs=1e-6)
+
+
+@pytest.mark.parametrize(("moving", "odd"), [(True, False), (False, True), (None, False)])
+def test_a_camera_that_says_it_rests_before_it_should_does_not_go_as_was_reckoned(
+    moving: bool | None, odd: bool
+) -> None:
+    skill, still = Skill(says_moving=True), replace(WAY, place=20.0, goal=20.0)
+    place = WAY.at(LATE)[0]
+    reply = Reply(Status(), 1, Reading(place, 20.0, 0.0, moving), None, LATE, LATE + skill.timing.usual)
+    told = ends(skill, (WAY, still, still), (KNOWN, KNOWN), reply, (place, 20.0, 0.0))
+    assert [end.odd for end in told] == [odd, odd]
+    rested = replace(reply, sent=WAY.ends + 0.1, received=WAY.ends + 0.1 + skill.timing.usual)
+    told = ends(skill, (WAY, still, still), (KNOWN, KNOWN), rested, (40.3, 20.0, 0.0))
+    assert (told[0] == read(40.3, KNOWN)) is odd
+
+
+def test_it_has_arrived_where_it_surely_ends_at_the_goal() -> None:
+    end = foretell(WAY, LATE, WAY.at(LATE)[0], KNOWN)
+    assert judge(AIM, 0.42, (end, STANDS)) == "there"
+    assert judge(AIM, 0.42, (end, replace(STANDS, at=20.4, seen=20.4))) == "unsure"
+    assert judge(AIM, 0.42, (replace(end, seen=40.5), STANDS)) == "unsure"
+    assert judge(AIM, 0.42, (replace(end, noise=0.5), STANDS)) == "unsure"
+    assert judge(AIM, 0.42, (replace(end, odd=True), STANDS)) == "unsure"
+
+
+@pytest.mark.parametrize(("doubt", "verdict"), [(0.1, "beside"), (0.24, "unsure"), (0.5, "unsure")])
+def test_a_hop_goes_on_from_there_where_it_surely_ends_beside(doubt: float, verdict: str) -> None:
+    beside = End(at=40.7, doubt=doubt, before=0.6, seen=40.7, noise=doubt)
+    assert judge(AIM, 0.42, (beside, STANDS)) == verdict
+    assert judge(AIM, 0.42, (replace(beside, at=41.5), STANDS)) == ("beside" if doubt < 0.25 else "unsure")
+    assert judge(AIM, 0.42, (replace(beside, at=41.5, odd=True), STANDS)) == "unsure"
+
+
+def test_the_reading_of_the_end_is_where_it_will_rest_and_says_nothing_of_motion() -> None:
+    ends = (End(-10.126, 0.1, 0.2, -10.1, 0.1), End(20.0, 0.1, 0.2, 20.0, 0.1))
+    assert at_end(Reading(350.9, 19.4, 2.0, True), ends) == Reading(349.87, 20.0, 2.0, None)
