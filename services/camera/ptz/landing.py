@@ -26,7 +26,7 @@ from services.camera.requests import Reading, Reply
 LEFT_DEG = (1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, when the look is of: the earliest that tells enough
 LEFT_LEVELS = 0.3  # of zoom's way, at most, where it is told in coarse steps
 EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
-EXPECTED_NOISE_DEG = 0.25  # and whose own noise is no more
+EXPECTED_NOISE_DEG = 0.18  # and whose own noise is no more
 LATER = 0.3  # of the spread of answers: a look is so much later, so that a quick one is not before its time
 
 # What is known without a look, and how exact one is; standard deviations.
@@ -44,7 +44,8 @@ SURE = 2.0  # standard deviations that it may end farther off than is likeliest,
 MISSED = 1.25  # and nearer, for a hop to go on from there: one too many does little harm
 OUTLIER = 2.0  # of them; a look farther off its course than that is of something else
 ARRIVES_DEG = 0.45  # it ends at its goal if it ends so near at the worst: 0.5 is promised
-NOISE_DEG = 0.4  # a look whose noise is more does not tell that
+NOISE_DEG = 0.2  # a look whose noise is more does not tell that
+RESTED_S = 0.02  # after it is reckoned to rest: what still moves then does not go as was reckoned
 GO_ON_DEG = 0.25  # doubt of where it ends, up to which a hop goes on from there
 TEACHES = 0.5  # of the doubt before it: a look that leaves less tells how far hops went
 
@@ -135,13 +136,14 @@ def read(place: float, known: Doubts) -> End:
 
 
 def ends(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts], reply: Reply, pose: Pose) -> list[End]:
-    """The ends of pan and tilt by the answer to a look, whose reading is `pose`; odd where it rests too soon."""
+    """The ends of pan and tilt by the answer to a look that reads `pose`; odd where it rests too soon, or too late."""
     seen = skill.paces[PAN].seen_at(reply.sent, reply.received - reply.sent - skill.timing.usual)
-    says_rest = skill.tells_rest(cast(Reading, reply.result).moving)
-    if says_rest and seen >= max(glide.ends for glide in glides):
+    moving, over = cast(Reading, reply.result).moving, seen - max(glide.ends for glide in glides)
+    if skill.tells_rest(moving) and over >= 0.0:
         return [read(pose[axis], known[axis]) for axis in (PAN, TILT)]
     told = [foretell(glides[axis], seen, pose[axis], known[axis]) for axis in (PAN, TILT)]
-    return [replace(end, odd=end.odd or says_rest) for end in told]
+    odd = skill.tells_rest(moving) or (moving is True and not skill.always_moving and over > RESTED_S)
+    return [replace(end, odd=end.odd or odd) for end in told]
 
 
 def judge(aim: Pose, near: float, told: Sequence[End]) -> Verdict:

@@ -81,6 +81,7 @@ def test_a_camera_that_says_it_rests_before_it_should_does_not_go_as_was_reckone
     rested = replace(reply, sent=WAY.ends + 0.1, received=WAY.ends + 0.1 + skill.timing.usual)
     told = ends(skill, (WAY, still, still), (KNOWN, KNOWN), rested, (40.3, 20.0, 0.0))
     assert (told[0] == read(40.3, KNOWN)) is odd
+    assert told[0].odd is bool(moving)  # and one that says it moves when it should rest does not either
 
 
 def test_it_has_arrived_where_it_surely_ends_at_the_goal() -> None:
