@@ -38,6 +38,7 @@ FAR_DEG = 360.0  # no hop goes farther
 TRY_DEG = 12.0  # a first hop, whose scale is a guess
 BULK = 1.5  # answers: a start at full speed that is shorter is not worth it
 LATE_LOOK = 2.0  # answers: a look as late as that does not delay what it is for
+LATEST = 2.0  # spreads: when a hop acted that was answered later is not known well enough to foretell where it leads
 RESTS_S = 0.02  # after it is reckoned to rest, where that was foretold
 FEW = 2  # commands, for a hop from rest and a look
 
@@ -53,6 +54,7 @@ class Hopping:
         self.glides: list[Glide] = []
         self.hops: list[Hop] = []
         self.foretold = 0.0  # degrees: doubt of where the hops began, where that was foretold
+        self.latest = 0.0  # seconds: how much later than usual a hop was answered at most
 
     def hop(self, now: float) -> Plan[tuple[Reading, float] | None]:
         """Goes to the goal, or near; None where the firmware has no such form, or it did not help."""
@@ -82,7 +84,7 @@ class Hopping:
         """A chain of hops, or one that is a try, to rest."""
         certain = self._honoured == "yes"
         self.turns += 1
-        self.glides, self.hops, self.foretold = [], [], 0.0
+        self.glides, self.hops, self.foretold, self.latest = [], [], 0.0, 0.0
         now = yield from (self._chain(now) if certain else self._send(now, TRY_DEG))
         landed = (yield from self._land(now)) if certain else None
         if landed is not None:
@@ -106,7 +108,7 @@ class Hopping:
     def _land(self, now: float) -> Plan[tuple[Reading, float] | None]:
         """Looks on the last bit of way, and hops on where that leads beside the goal; None: it is not sure where."""
         helm = self.helm
-        while helm.left > 0:
+        while helm.left > 0 and self.latest <= LATEST * helm.skill.timing.spread:
             doubts = landing.doubts(helm.skill, self.form, self.hops, self.foretold)
             look = landing.sight(helm.skill, self.glides, doubts)
             if look is None:
@@ -251,6 +253,7 @@ class Hopping:
         """Where it leads, now that it is known from where."""
         helm = self.helm
         late = reply.received - reply.sent - helm.skill.timing.usual
+        self.latest = max(self.latest, late)
         acted = reply.received - helm.skill.paces[PAN].other(ACT_PART) * late
         poses = [self._at(axis, acted) for axis in range(3)]
         pan, tilt = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from statistics import median
 from typing import Literal
 
@@ -14,7 +15,7 @@ from services.camera.ptz.move import goto
 from services.camera.ptz.planes import POINT, TURN, VIEW, Law
 from services.camera.ptz.scale import Hop, learn, zooms
 from services.camera.ptz.skill import RelativeForm, Skill
-from services.camera.requests import MoveOver, Reading, Request, Status
+from services.camera.requests import MoveOver, Reading, Reply, Request, Status
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.track import Moment, Rail, go
 from tests.camera.goals import Rig, random_goals
@@ -111,6 +112,32 @@ def test_a_look_on_the_last_bit_of_the_way_is_mostly_enough_and_every_goal_is_me
             foretold += once and rig.near.moving is None  # no reading is like that: this firmware says whether it moves
         rig.now += 1.0
     assert foretold > 10
+
+
+def test_where_a_hop_was_answered_late_its_end_is_looked_at_and_not_foretold() -> None:
+    rig = Rig(replace(PROFILES["ip2m-841b-strict"], latency_tail=0.08))
+    took: list[float] = []  # by the hops since it last stood, seconds
+    rests = True
+
+    def log(reply: Reply) -> None:
+        nonlocal rests
+        if isinstance(reply.request, MoveOver):
+            took[:] = [*([] if rests else took), reply.received - reply.sent]
+            rests = False
+        elif isinstance(reply.result, Reading):
+            rests = reply.result.moving is False
+
+    rig.log, foretold, late = log, 0, 0
+    for goal in random_goals(60, 3):
+        took.clear()
+        rig.go(goal)
+        was_late = max(took, default=0.0) > 0.55  # 0.3 s are usual, and 0.1 s their spread
+        late += was_late
+        if rig.near is not None and rig.near.moving is None:
+            foretold += 1
+            assert not was_late
+        rig.now += 1.0
+    assert min(foretold, late) > 5
 
 
 @pytest.mark.parametrize("seed", range(6))
