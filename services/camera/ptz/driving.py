@@ -69,7 +69,7 @@ class Driving:
         self.helm.rests = arrives
         there = self.helm.limits.pose(reading) if rests else way.to  # one on its last bit of way teaches nothing
         own.judge(self.helm.skill, here, way, there)
-        self.helm.skill.zoomed = (reading.zoom, way.to[ZOOM]) if abs(reading.zoom - way.to[ZOOM]) <= 1.0 else None
+        self.helm.skill.lead_zoom(reading.zoom, way.to[ZOOM])
         self.helm.stand(reading)
         return reading, now
 

@@ -177,7 +177,7 @@ def learn(
         noise = max(scale.READ_DEG, *(end.doubt for end in told))
         scale.learn(skill, form, hops, (pan, tilt, zoom), limits, there, noise)
     else:
-        skill.zoomed = (reading.zoom, zoom) if abs(reading.zoom - zoom) <= scale.LEVEL else None
+        skill.lead_zoom(reading.zoom, zoom)
 
 
 def at_end(reading: Reading, told: Sequence[End]) -> Reading:

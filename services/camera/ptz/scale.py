@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import hypot
 
 import numpy as np
 
@@ -12,13 +12,12 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import EDGE_DEG, Limits, Pose
 from services.camera.ptz.pace import Seen, Told, Vector
 from services.camera.ptz.planes import Planes, Scale
-from services.camera.ptz.skill import RelativeForm, Skill
+from services.camera.ptz.skill import LEVEL, RelativeForm, Skill
 from services.camera.requests import Reading
 
 STAYED_DEG = 0.3
 FAR_DEG = 3.0  # a shorter way is no measure for how far off it ended
 OFF_COUNTS, OFF_MOST = 0.2, 0.25  # of a way: what each chain of hops adds to what is usual, and how far off is too far
-LEVEL = 1.0  # zoom is read in coarse steps
 READ_DEG, TIME_S = 0.1, 0.003  # of a reading; when a hop took effect
 LEVELS = 0.5  # where zoom is while it turns
 SHARE = 0.8  # of the way that the first hop of a chain went; less tells little of the motor before it
@@ -76,7 +75,7 @@ def learn(
         skill.honours[form] = "no" if moved < STAYED_DEG < max(map(abs, hops[0].ways[:ZOOM])) else "yes"
     if zooms(form) not in skill.honours:
         _see_zoom(skill, form, hops[0].begun[ZOOM], to[ZOOM], reading.zoom)
-    skill.zoomed = (reading.zoom, to[ZOOM]) if abs(reading.zoom - to[ZOOM]) <= LEVEL else None
+    skill.lead_zoom(reading.zoom, to[ZOOM])
     if skill.honours[form] == "yes":
         wrong = (there[PAN] - to[PAN], there[TILT] - to[TILT])
         _weigh(skill, form, hops, to, wrong, read)
@@ -97,8 +96,7 @@ def _see_zoom(skill: Skill, form: RelativeForm, begun: float, to: float, reading
 
 def unsure(scale: Scale, hops: Sequence[Hop]) -> float:
     """How far from where it should the end of a chain may be, degrees: one standard deviation."""
-    told = [_told(scale.planes, axis, hops) for axis in (PAN, TILT)]
-    return max(sqrt(one.doubt**2 + one.noise**2 + one.before**2 - READ_DEG**2) for one in told)
+    return max(hypot(*doubts(scale, hops, axis)) for axis in (PAN, TILT))
 
 
 def doubts(scale: Scale, hops: Sequence[Hop], axis: int) -> tuple[float, float]:
@@ -154,7 +152,7 @@ class _Told:
         return max(0.0, abs(wrong - self.beside) - self.before - ALIKE * self.doubt)
 
 
-def _told(planes: Planes, axis: int, hops: Sequence[Hop], read: float = READ_DEG) -> _Told:
+def _told(planes: Planes, axis: int, hops: Sequence[Hop], read: float) -> _Told:
     slope, noise, share, counts, beside = np.zeros_like(planes.mean), read, 1.0, 1.0, 0.0
     for hop in reversed(hops):
         share = counts

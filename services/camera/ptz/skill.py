@@ -25,6 +25,7 @@ SOONER_S, LATER_S, MOST_LATE_S = 0.008, 0.04, 0.5
 NEAR_DEG, NEARER_DEG = 0.42, 0.35  # a reading so near has arrived: 0.5 promised, resolution and dither taken off
 STILL_DEG = 0.05
 STEADY = 6  # readings at rest that were alike show that they do not dither
+LEVEL = 1.0  # zoom is read in coarse steps: a reading may be so far from the truth
 GRIDS = (2.0, 1.0)  # some firmware tells zoom in coarse steps
 
 
@@ -153,6 +154,10 @@ class Skill:
         """Takes in a reading of zoom: whether they come in steps shows between the ends."""
         if reading not in ends and reading not in self.zoom_steps:
             self.zoom_steps = [*self.zoom_steps[-7:], reading]
+
+    def lead_zoom(self, reading: float, to: float) -> None:
+        """The firmware drove zoom there by itself: so it stands there, unless its reading is of another step."""
+        self.zoomed = (reading, to) if abs(reading - to) <= LEVEL else None
 
     @property
     def zoom_grid(self) -> float:
