@@ -27,6 +27,7 @@ MANY_COMMANDS = 7  # after so many, a look has to be worth more
 ENOUGH_DEG = 0.4  # doubt about the place of an end that needs no look
 PROBE_DEG_S = 4.0
 PROBE_S = 0.35  # seen in the readings, and harmless the wrong way
+FASTER = 2.0  # than is guessed, it may be
 MOVED_DEG = 0.3
 PROBE_LOOKS = 3
 LOOKS = 1  # readings in a leg
@@ -104,7 +105,10 @@ class Turning:
         """From the start of a leg to the time for its end; an axis that ends before the other is ended."""
         while not leg.joint and len(turning) > 1:
             now = yield from self._watch(leg, turning, now)
-            del turning[min(turning, key=lambda axis: self._end(leg, axis, now))]
+            ends = {axis: self._end(leg, axis, now) for axis in turning}
+            if max(ends.values()) <= now + self.helm.skill.timing.usual:
+                return now  # so late that both are to end
+            del turning[min(ends, key=lambda axis: ends[axis])]
             now = (yield from self.helm.start(levels_of(turning))).received
         return (yield from self._watch(leg, turning, now))
 
@@ -168,6 +172,16 @@ class Turning:
     def _rate(self, axis: int) -> float:
         return self.helm.skill.paces[axis].rate(abs(self.helm.course.levels[axis]))
 
+    def _risky(self, ends: float) -> bool:
+        """Whether an axis that turns may be at its stop by then, for all that is known of its speed."""
+        for axis in (PAN, TILT):
+            level, (low, high) = self.helm.course.levels[axis], self.helm.limits.ranges[axis]
+            at = self.helm.course.stopped(axis, ends)
+            room = high - at if level > 0 else at - low
+            if level and room < 2 * self.helm.course.doubt(axis, ends):
+                return True
+        return False
+
     def _watch(self, leg: Leg, left: dict[int, int], now: float) -> Plan[float]:
         """Waits until the next end has to be sent; reads on the way where that makes the end more certain."""
         usual, spread = self.helm.skill.timing.usual, self.helm.skill.timing.spread
@@ -182,7 +196,8 @@ class Turning:
             send = min([send, *(self._safe(axis, self._rate(axis), now) - usual for axis in self._along(left))])
             sure = all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)
             longest = BLIND_SURE_S if sure else BLIND_S
-            if (look >= LOOKS and send - now <= longest) or send - now < usual + spread:
+            enough_looks = look >= LOOKS and send - now <= longest and not self._risky(send + usual)
+            if enough_looks or send - now < usual + spread:
                 break
             enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else self.helm.near
             small = {axis: max(LOOK_PART * spread * rate, enough) for axis, rate in rates.items()}
@@ -197,27 +212,38 @@ class Turning:
         return (yield from wait(max(now, send)))
 
     def _probe(self, axes: list[int]) -> Plan[float]:
-        """Turns slowly to see which way that is; it goes on turning."""
+        """Turns slowly to see which way that is; it goes on turning, unless a stop may be near."""
         levels = [0, 0, 0]
         for axis in axes if self.helm.skill.diagonals else axes[:1]:
-            here = self.helm.course.origin[axis]
-            low, high = self.helm.limits.ranges[axis]
-            timing, pace = self.helm.skill.timing, self.helm.skill.paces[axis]
-            most = min(PROBE_DEG_S, min(high - here, here - low) / (PROBE_S + 2 * timing.usual + timing.tail))
-            speed = max((speed for speed in pace.speeds if pace.guess[speed - 1] <= most), default=1)
-            levels[axis] = speed * (1 if self.helm.aim[axis] > here else -1)
+            levels[axis] = self._probing(axis)
         now = (yield from self.helm.start((levels[0], levels[1], levels[2]))).received
         for _ in range(PROBE_LOOKS):
             now = yield from wait(now + PROBE_S)
             reply = yield from self.helm.send(Status())
             now, reading = reply.received, cast(Reading, reply.result)
-            if self._see_senses(reading, levels):
+            if self._see_senses(reading, levels) or not any(self.helm.course.levels):
                 break
+            if any(self._confined(axis, abs(level)) for axis, level in enumerate(levels) if level):
+                now = yield from self.helm.stop(now)
         for axis in (PAN, TILT):
             if levels[axis] and not self.helm.skill.senses[axis].sure:  # an end stop may be in its way
                 self.helm.course.flip(axis)
         self.helm.course.read(reply, reading)
         return now
+
+    def _probing(self, axis: int) -> int:
+        """A slow speed towards the goal, which as far as is guessed reaches no stop before the first look."""
+        here, (low, high) = self.helm.course.origin[axis], self.helm.limits.ranges[axis]
+        timing, pace = self.helm.skill.timing, self.helm.skill.paces[axis]
+        most = min(PROBE_DEG_S, min(high - here, here - low) / (PROBE_S + 2 * timing.usual + timing.tail))
+        speed = max((speed for speed in pace.speeds if pace.guess[speed - 1] <= most), default=1)
+        return speed * (1 if self.helm.aim[axis] > here else -1)
+
+    def _confined(self, axis: int, speed: int) -> bool:
+        """Whether a stop may be in the way of a second look."""
+        here, (low, high) = self.helm.course.origin[axis], self.helm.limits.ranges[axis]
+        timing, rate = self.helm.skill.timing, FASTER * self.helm.skill.paces[axis].guess[speed - 1]
+        return min(high - here, here - low) < rate * (2 * (PROBE_S + timing.usual) + timing.usual + timing.tail)
 
     def _see_senses(self, reading: Reading, levels: list[int]) -> bool:
         """Whether every axis that was probed has shown which way it goes."""
@@ -231,6 +257,6 @@ class Turning:
                 seen = False
                 continue
             sense.sure = True
-            if moved * self.helm.course.levels[axis] < 0:
+            if moved * levels[axis] < 0:
                 self.helm.course.flip(axis)
         return seen
