@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
@@ -25,6 +26,7 @@ class Network:
         self.port = int(self._listener.getsockname()[1])
         self._flowing, self._parked, self._closing = threading.Event(), threading.Event(), threading.Event()
         self._flowing.set()
+        self.let_in: list[float] = []  # when a connection was, seconds since 1970
         self._lost: list[socket.socket] = []  # our own that fill the queue, and who was let in too late
         self._open: set[socket.socket] = set()
         self._far: set[socket.socket] = set()
@@ -93,6 +95,7 @@ class Network:
             if not self._flowing.is_set():
                 self._lost.append(near)
                 continue
+            self.let_in.append(time.time())
             try:
                 far = socket.create_connection(("127.0.0.1", self.to), timeout=2)
             except OSError:

@@ -143,7 +143,10 @@ def cut_network(flat: SmallFlat, *, camera: str = "ip1", seconds: float = 0.0) -
         rests(door)
         takes_orders(bus, camera)
     assert "action=stop" in first["target"], f"the first request was {first['target']}"
-    return float(first["time"]) - back
+    reached = float(first["time"]) - back
+    knocked = [round(when - back, 3) for when in net.let_in if when > back]
+    assert reached < REACHED_S, f"{reached:.3f} s after the return; connections were let in at {knocked}"
+    return reached
 
 
 def speaks(bus: Client, camera: str) -> None:

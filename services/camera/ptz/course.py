@@ -13,6 +13,7 @@ from services.camera.requests import Reading, Reply
 PAN, TILT, ZOOM = range(3)
 END = 0.15  # degrees or levels: as near as that to an end of its range, an axis may have been stopped by it
 READ_DEG = 0.08  # the resolution, and a little dither
+GRID = 2.0  # levels: the steps in which zoom may be told, while that is not known
 ZOOM_SLOWS_S = 0.1  # coarse readings do not teach how long zoom takes to stop
 CLEAR_DEG = 2.0  # so far the wrong way is not a doubtful reading
 TIME_S = 0.01  # what is left of the timing of a command or a reading when all that is learnt is taken off
@@ -92,7 +93,7 @@ class Course:
         low, high = self.limits.ranges[axis]
         seen_at = pace.seen_at(reply.sent, late)
         speed = abs(pace.velocity(told, seen_at))
-        grid = self.skill.zoom_grid or 1.0 if axis == ZOOM else 0.0
+        grid = self.skill.zoom_grid or GRID if axis == ZOOM else 0.0
         noise = 0.3 * grid + READ_DEG
         changes = [abs(one.level) for one in told]
         timing = TIME_S * max((pace.rate(level) for level in changes if level), default=0.0)

@@ -75,11 +75,12 @@ class Driving:
 
 
 def at_rest(
-    helm: Helm, arrives: float, to: Pose, now: float, *, certain: bool, about: float = 0.0
+    helm: Helm, arrives: float, to: Pose, now: float, *, certain: bool, about: float = 0.0, hops: bool = False
 ) -> Plan[tuple[Reading, float, bool]]:
     """Looks until what the firmware drives has ended, as good as; `certain`: it is known exactly where that leads.
 
-    `about`: that is not known quite exactly, but so few degrees; there one look is enough if it tells of rest.
+    `about`: that is not known quite exactly, but so few degrees; there one look is enough if it tells of rest. `hops`:
+    it may be beyond its end and return, so it is not there while it says that it moves.
     Returns the reading, when it came, and whether it surely shows the camera at rest.
     """
     skill = helm.skill
@@ -94,7 +95,8 @@ def at_rest(
         if len(seen) > 1 and seen[-2].moving and same(seen[-2], seen[-1]):
             skill.says_late = True
         rests = skill.tells_end(seen[-1].moving)
-        there = certain and off <= NEARER_DEG and (rests or not about)
+        goes = hops and seen[-1].moving is True and not skill.always_moving
+        there = certain and off <= NEARER_DEG and (rests or not (about or goes))
         on = helm.beside(pose) and off <= about and rests
         still = reply.sent >= before + PAIR_S and same(seen[-2], seen[-1])
         if there or on or still:

@@ -94,7 +94,7 @@ class Hopping:
         arrives = max(self._ends(), zoom.ends)
         self.helm.rests = arrives
         about = 0.0 if self._exact(to) else ABOUT_DEG
-        reading, now, _ = yield from at_rest(self.helm, arrives, to, now, certain=certain, about=about)
+        reading, now, _ = yield from at_rest(self.helm, arrives, to, now, certain=certain, about=about, hops=True)
         scale.learn(self.helm.skill, self.form, self.hops, to, self.helm.limits, reading)
         self.helm.stand(reading)
         return reading, now
@@ -102,8 +102,8 @@ class Hopping:
     def _exact(self, to: Pose) -> bool:
         """Whether it surely ends at the goal, so that a look on its last bit of way is enough."""
         off = max(abs(self.helm.aim[axis] - to[axis]) for axis in (PAN, TILT))
-        unsure = scale.unsure(self.helm.skill.scales[self.form], self.hops)
-        return not self.helm.skill.says_late and off + 2 * unsure <= EXACT_DEG
+        skill, unsure = self.helm.skill, scale.unsure(self.helm.skill.scales[self.form], self.hops)
+        return not skill.says_late and off + 2 * unsure <= EXACT_DEG and scale.timed(skill, self.hops)
 
     def _land(self, now: float) -> Plan[tuple[Reading, float] | None]:
         """Looks on the last bit of way, and hops on where that leads beside the goal; None: it is not sure where."""

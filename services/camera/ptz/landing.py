@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import hypot
+from math import hypot, sqrt
 from typing import Literal, cast
 
 from services.camera.ptz import scale
@@ -32,6 +32,8 @@ LATER = 0.3  # of the spread of answers: a look is so much later, so that a quic
 # What is known without a look, and how exact one is; standard deviations.
 BELIEVED = 0.35  # of the doubt that is kept of a hop's scale and place: large, so that they go on learning
 LEAST_DEG = 0.05  # of where hops lead
+FAR = 2.0  # such deviations of the time: what rests by now need not have rested a moment before
+START = 1.5  # of the time from where it may have been to rest, when the last hop took the place of one that ended
 READ_DEG = 0.06  # of a reading
 LEAST_S = 0.004  # of the moment that a look tells of
 STEP_DEG = 0.05  # of the goal: what it would change of a look
@@ -40,7 +42,7 @@ UNSEEN = 0.5  # of the doubt of the goal is noise of a look that shows nothing o
 BENT = 0.3  # of how far off it ends: the reckoning of that may be wrong by so much
 
 # What follows from it.
-SURE = 2.0  # standard deviations that it may end farther off than is likeliest, to have arrived
+SURE = 2.25  # standard deviations that it may end farther off than is likeliest, to have arrived
 MISSED = 1.25  # and nearer, for a hop to go on from there: one too many does little harm
 OUTLIER = 2.0  # of them; a look farther off its course than that is of something else
 ARRIVES_DEG = 0.45  # it ends at its goal if it ends so near at the worst: 0.5 is promised
@@ -57,7 +59,8 @@ class Doubts:
     """What is not known of an axis on its way, standard deviations.
 
     `goal`: how far it was to go, degrees; `place`: where that began, degrees, and then all of its way is beside;
-    `read`: a reading, degrees; `time`: the moment that it tells of, seconds; `change`: its acceleration, a share.
+    `read`: a reading, degrees; `time`: the moment that it tells of, seconds; `change`: its acceleration, a share;
+    `start`: seconds that a hop in flight was sooner or later on its way.
     """
 
     goal: float
@@ -65,6 +68,7 @@ class Doubts:
     read: float
     time: float
     change: float
+    start: float = 0.0
 
     @property
     def end(self) -> float:
@@ -90,15 +94,23 @@ class End:
 
 def doubts(skill: Skill, form: RelativeForm, hops: Sequence[Hop], place: float) -> tuple[Doubts, Doubts]:
     """Those of pan and tilt on the way of a chain of hops; `place`: of where it began, beside what the hops tell."""
-    reads = skill.paces[PAN]
-    time = hypot(reads.other_doubt(READ_LATE), reads.other_doubt(READ_PART) * skill.timing.spread / 2, LEAST_S)
+    time = _time(skill, skill.timing.spread / 2)
 
     def of(axis: int) -> Doubts:
         goal, before = scale.doubts(skill.scales[form], hops, axis)
         change = skill.paces[axis].other_doubt(HALF_CHANGE) / skill.paces[axis].other(HALF_CHANGE)
-        return Doubts(hypot(BELIEVED * goal, LEAST_DEG), hypot(BELIEVED * before, place), READ_DEG, time, change)
+        began = hypot(BELIEVED * before, place)
+        slows = 2 * skill.paces[axis].other(HALF_CHANGE)  # seconds for a change by one degree/s
+        start = START * sqrt(2 * slows * began) if len(hops) > 1 else 0.0
+        return Doubts(hypot(BELIEVED * goal, LEAST_DEG), began, READ_DEG, time, change, start)
 
     return of(PAN), of(TILT)
+
+
+def _time(skill: Skill, late: float) -> float:
+    """Doubt of the moment that a look tells of which is answered so much later than usual, or sooner."""
+    reads = skill.paces[PAN]
+    return hypot(reads.other_doubt(READ_LATE), reads.other_doubt(READ_PART) * late, LEAST_S)
 
 
 def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> float | None:
@@ -115,10 +127,11 @@ def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> flo
 
 def foretell(glide: Glide, seen: float, place: float, known: Doubts) -> End:
     """The end of a glide that was seen at a place, at a time: the likeliest, of two things that may have been off."""
-    reckoned, speed = glide.at(seen)
+    reckoned, _ = glide.at(seen)
     other, _ = replace(glide, goal=glide.goal + (STEP_DEG if glide.goal >= reckoned else -STEP_DEG)).at(seen)
     shown = abs(other - reckoned) / STEP_DEG
-    noise = hypot(known.read, known.time * speed, known.change * (glide.goal - reckoned))
+    moved = glide.at(seen - FAR * hypot(known.time, known.start))[0] - reckoned
+    noise = hypot(known.read, moved / FAR, known.change * (glide.goal - reckoned))
     wrong, bends = place - reckoned, 1.0 / max(LEAST_SHOWN, shown) - 1.0
     before = known.end
     odd = wrong**2 > OUTLIER**2 * (before**2 + noise**2)
@@ -137,7 +150,8 @@ def read(place: float, known: Doubts) -> End:
 
 def ends(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts], reply: Reply, pose: Pose) -> list[End]:
     """The ends of pan and tilt by the answer to a look that reads `pose`; odd where it rests too soon, or too late."""
-    seen = skill.paces[PAN].seen_at(reply.sent, reply.received - reply.sent - skill.timing.usual)
+    late = reply.received - reply.sent - skill.timing.usual
+    seen, known = skill.paces[PAN].seen_at(reply.sent, late), [replace(one, time=_time(skill, late)) for one in known]
     moving, over = cast(Reading, reply.result).moving, seen - max(glide.ends for glide in glides)
     if skill.tells_rest(moving) and over >= 0.0:
         return [read(pose[axis], known[axis]) for axis in (PAN, TILT)]

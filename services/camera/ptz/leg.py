@@ -20,6 +20,7 @@ from services.camera.ptz.outlook import (
     chance,
     feared,
     held_for,
+    looks_in,
     spread_of,
 )
 from services.camera.ptz.skill import Skill
@@ -61,14 +62,16 @@ class Leg:
 
 def choose(ways: dict[int, Way], skill: Skill, *, left: int = 12, runs: dict[int, int] | None = None) -> Leg:
     """The leg that probably costs least; `left` commands until it is read to be there; `runs`: what needs no start."""
-    outlook = Outlook(ways, skill)
+    outlook, left = Outlook(ways, skill), max(0, left)  # what is spent is spent
     legs = [leg for pair in _speeds(ways) for leg in _legs(ways, pair, skill)]
     return min((_judged(leg, outlook, left, runs or {}) for leg in legs), key=lambda leg: leg.cost)
 
 
 def _speeds(ways: dict[int, Way]) -> Iterator[dict[int, int]]:
     axes = list(ways)
-    choices = [way.pace.speeds for way in ways.values()]
+    choices = [
+        [one for one in way.pace.speeds if one == 1 or way.pace.rate(one) <= way.fastest] for way in ways.values()
+    ]
     for first in choices[0]:
         if len(axes) == 1:
             yield {axes[0]: first}
@@ -120,7 +123,8 @@ def _judged(leg: Leg, outlook: Outlook, left: int, runs: dict[int, int]) -> Leg:
     misses |= {axis: abs(way.distance) for axis, way in ways.items() if axis not in leg.parts}
     known = all(ways[axis].pace.known(part.speed) for axis, part in leg.parts.items())
     running = {axis: part.speed for axis, part in leg.parts.items()} == runs
-    after = left - (LEG - 1 if leg.feared else LEG) - (not leg.joint) - (not known) + running - (len(misses) > 1)
+    after = left - (LEG - 1 if leg.feared else LEG) - (not leg.joint) - (len(misses) > 1)
+    after += running - looks_in(leg.held, known=known)
     correction = CORRECTION_S * skill.timing.usual
     correction += max((outlook.seconds(axis, miss, after) for axis, miss in misses.items()), default=0.0)
     arrives = prod(chances) if len(leg.parts) == len(ways) else 0.0

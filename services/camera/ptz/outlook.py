@@ -8,7 +8,7 @@ time. Pure. Not here: both axes together, which is `leg.py`.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import exp, log, sqrt
+from math import exp, inf, log, sqrt
 
 from services.camera.ptz.pace import HALF_CHANGE, STOP_LATE, Pace
 from services.camera.ptz.skill import Skill
@@ -19,7 +19,10 @@ LONG = 4.0  # answers: a leg as long as that is read in, which leaves part of th
 READ_ON_THE_WAY = 0.1
 CRAWL_DEG = 0.2  # so much of a goal may be given up for the fear of a late stop
 LEG = 3  # commands: a start, an end, a reading
-OVER_S = 15.0  # what it is worth to arrive with the commands that there are
+BLIND_S = 8.0  # nothing turns for longer without a look
+OVER_S = 4.0  # what it is worth to need a command less, where there are too few
+MOST_OVER = 6  # what needs more commands than that beyond those that there are is not thought through
+NEVER_S = 30.0
 FEW = 8  # commands: with no more left than that, each is worth more, so
 RUNG_S = 1.1  # an end that comes early, for a slower leg to go on, has to save so much
 FINE = 6.0  # steps of distance in each factor of e
@@ -29,13 +32,14 @@ FINE = 6.0  # steps of distance in each factor of e
 class Way:
     """What one axis has before it: the distance with its sign, and how much room there is behind its end.
 
-    `near`: so far from its goal it has arrived.
+    `near`: so far from its goal it has arrived. `fastest`: it may begin with no higher rate, but for the lowest.
     """
 
     distance: float
     room: float
     pace: Pace
     near: float
+    fastest: float = inf
 
 
 @dataclass
@@ -59,12 +63,12 @@ class Outlook:
         """From rest at a distance (positive) until it is read to be there; `left` commands until then."""
         if distance <= self.ways[axis].near:
             return 0.0
-        if left < LEG:
-            return OVER_S
+        if left < -MOST_OVER:
+            return NEVER_S
         step = round(FINE * log(distance))
         key = (axis, step, left)
         if key not in self.known:
-            self.known[key] = OVER_S  # until it is known better
+            self.known[key] = NEVER_S  # until it is known better
             self.known[key] = min(
                 self._leg(axis, exp(step / FINE), speed, left) for speed in self.ways[axis].pace.speeds
             )
@@ -74,14 +78,21 @@ class Outlook:
         way = self.ways[axis]
         short = feared(way, speed, distance, self.skill)
         if short >= distance and speed > 1:
-            return OVER_S
+            return NEVER_S
         held = max(self.skill.timing.usual, held_for(way.pace, speed, distance - short))
-        left -= 0 if way.pace.known(speed) else 1  # it will be looked at
+        looks = looks_in(held, known=way.pace.known(speed))
+        held += OVER_S * max(0, LEG + looks - max(0, left))
+        left -= looks
         if short > way.near:
             return held + self.rung(left) + self.seconds(axis, short, left - 1)
         spread = spread_of(way.pace, speed, held, self.skill)
         correction = CORRECTION_S * self.skill.timing.usual + self.seconds(axis, way.near + spread / 2, left - LEG)
         return held + (1 - chance(-short, spread, way.near)) * correction
+
+
+def looks_in(held: float, *, known: bool) -> int:
+    """How often a leg is looked at."""
+    return int(held / BLIND_S) + (not known)
 
 
 def feared(way: Way, speed: int, distance: float, skill: Skill) -> float:

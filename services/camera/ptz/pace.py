@@ -33,6 +33,7 @@ SLOWEST = 0.05
 FLOOR = 0.2  # of the guess: what other speeds teach of one makes it no slower
 DRIFT = 0.002  # of each rate, per motion: motors age
 DOUBT_AGAIN = 0.01  # of the first guess's covariance, when what is known was wrong
+ROUNDS = 3  # of learning from one reading: a speed that is reached late bends what it shows
 OUTLIER = 3.0  # standard deviations; beyond, a reading counts for less
 
 
@@ -137,8 +138,12 @@ class Pace:
         likely = float(slope @ self.cov @ slope) + seen.noise**2
         if wrong * wrong > OUTLIER**2 * likely and not self.velocity(told, self.seen_at(seen.at, seen.late)):
             self.cov = self.cov + DOUBT_AGAIN * _prior(self.guess)[1]
-        self.mean, self.cov = taught(self.mean, self.cov, slope, wrong, seen.noise)
-        self._keep_within()
+        before, cov = self.mean, self.cov
+        for _ in range(ROUNDS):  # the iterated extended Kalman filter: the slope is that where this leads
+            expected, slope = self._slope(told, seen)
+            wrong = seen.travel - expected - float(slope @ (before - self.mean))
+            self.mean, self.cov = taught(before, cov, slope, wrong, seen.noise)
+            self._keep_within()
 
     def measure_late_from(self, later: float) -> None:
         """What is usual for an answer is so many seconds more now; readings and commands mean the same as before."""

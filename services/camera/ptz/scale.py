@@ -10,7 +10,7 @@ import numpy as np
 
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import EDGE_DEG, Limits, Pose
-from services.camera.ptz.pace import Seen, Told, Vector
+from services.camera.ptz.pace import HALF_CHANGE, Seen, Told, Vector
 from services.camera.ptz.planes import Planes, Scale
 from services.camera.ptz.skill import LEVEL, RelativeForm, Skill
 from services.camera.requests import Reading
@@ -21,6 +21,7 @@ OFF_COUNTS, OFF_MOST = 0.2, 0.25  # of a way: what each chain of hops adds to wh
 READ_DEG, TIME_S = 0.1, 0.003  # of a reading; when a hop took effect
 LEVELS = 0.5  # where zoom is while it turns
 SHARE = 0.8  # of the way that the first hop of a chain went; less tells little of the motor before it
+TIMED = 0.5  # of the time that an axis takes to slow down: with less doubt it is known when it rests
 ALIKE = 2.0  # what each of two takes from one reading, the other took too: so often more doubt is left to both
 
 
@@ -97,6 +98,12 @@ def _see_zoom(skill: Skill, form: RelativeForm, begun: float, to: float, reading
 def unsure(scale: Scale, hops: Sequence[Hop]) -> float:
     """How far from where it should the end of a chain may be, degrees: one standard deviation."""
     return max(hypot(*doubts(scale, hops, axis)) for axis in (PAN, TILT))
+
+
+def timed(skill: Skill, hops: Sequence[Hop]) -> bool:
+    """Whether it was known when a hop that another one followed had ended."""
+    known = all(pace.other_doubt(HALF_CHANGE) < TIMED * pace.other(HALF_CHANGE) for pace in skill.paces[:ZOOM])
+    return known or len(hops) == 1
 
 
 def doubts(scale: Scale, hops: Sequence[Hop], axis: int) -> tuple[float, float]:

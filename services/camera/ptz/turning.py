@@ -5,6 +5,7 @@ Which speeds a leg has is chosen in `leg.py`; what is done after it, in `move.py
 
 from __future__ import annotations
 
+from math import inf
 from typing import cast
 
 from services.camera.plan import Plan, wait
@@ -13,7 +14,7 @@ from services.camera.ptz.course import PAN, TILT
 from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.homing import Homing
 from services.camera.ptz.leg import DANGER, Leg, choose
-from services.camera.ptz.outlook import Way
+from services.camera.ptz.outlook import BLIND_S, Way
 from services.camera.ptz.zooming import Zooming
 from services.camera.requests import Reading, Refused, Status
 
@@ -25,13 +26,13 @@ SHARP_DEG = 0.05  # what a reckoning leaves open, at least
 ZOOM_COMMANDS = 1  # zoom's start is the end of a leg
 MANY_COMMANDS = 7  # after so many, a look has to be worth more
 ENOUGH_DEG = 0.4  # doubt about the place of an end that needs no look
-PROBE_DEG_S = 4.0
-PROBE_S = 0.35  # seen in the readings, and harmless the wrong way
+PROBE_S = 0.35  # seen in the readings
+PROBE_LONG_S = 1.5  # shows how fast it is, too, and is harmless the wrong way
 FASTER = 2.0  # than is guessed, it may be
 MOVED_DEG = 0.3
+LATE_PART = 0.85  # of how late an answer may be, where a motion that it begins is ended only after it
 PROBE_LOOKS = 3
 LOOKS = 1  # readings in a leg
-BLIND_S, BLIND_SURE_S = 4.0, 8.0  # nothing turns for longer without another one; or when its speed is known
 MOST_LOOKS = 15
 LOOK_PART = 1.0  # of what a late end makes of a leg: doubt below that needs no look
 
@@ -143,15 +144,25 @@ class Turning:
             room = high - self.helm.aim[axis] if distance > 0 else self.helm.aim[axis] - low
             doubt = self.helm.course.doubt(axis, now) if self.helm.course.told[axis] else 0.0
             room -= 2 * max(0.0, doubt - LOST_DEG)
-            ways[axis] = Way(distance, room, self.helm.skill.paces[axis], self.helm.near)
+            fastest = self._fastest_after(axis, abs(distance) + room) if self._runs_to(axis, distance) else inf
+            ways[axis] = Way(distance, room, self.helm.skill.paces[axis], self.helm.near, fastest)
         left = self.helm.left - (ZOOM_COMMANDS if zoom else 0)
         leg = choose(ways, self.helm.skill, left=left, runs=self._runs(ways))
         return leg, {axis: part.speed * (sign(ways[axis].distance) or 1) for axis, part in leg.parts.items()}
 
+    def _runs_to(self, axis: int, distance: float) -> bool:
+        """Whether an axis turns already, the right way."""
+        return self.helm.course.levels[axis] * distance > 0
+
+    def _fastest_after(self, axis: int, left: float) -> float:
+        """The rate with which it may go on when the answer to that comes late and only then it can be ended."""
+        timing = self.helm.skill.timing
+        return (left - LATE_PART * timing.tail * self._rate(axis)) / timing.usual
+
     def _runs(self, ways: dict[int, Way]) -> dict[int, int]:
         """The speeds of the axes that turn already, the right way."""
         levels = self.helm.course.levels
-        return {axis: abs(levels[axis]) for axis, way in ways.items() if levels[axis] * way.distance > 0}
+        return {axis: abs(levels[axis]) for axis, way in ways.items() if self._runs_to(axis, way.distance)}
 
     def _end(self, leg: Leg, axis: int, now: float) -> float:
         """When the end of an axis has to take effect."""
@@ -194,17 +205,16 @@ class Turning:
             else:
                 send = min(ends.values()) - usual
             send = min([send, *(self._safe(axis, self._rate(axis), now) - usual for axis in self._along(left))])
-            sure = all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)
-            longest = BLIND_SURE_S if sure else BLIND_S
-            enough_looks = look >= LOOKS and send - now <= longest and not self._risky(send + usual)
-            if enough_looks or send - now < usual + spread:
+            risky, soon = self._risky(send + usual), send - now <= BLIND_S
+            sure = not risky and all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)
+            if send - now < usual + spread or (look >= LOOKS and soon and not risky):
                 break
             enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else self.helm.near
             small = {axis: max(LOOK_PART * spread * rate, enough) for axis, rate in rates.items()}
             certain = all(self.helm.course.doubt(axis, ends[axis]) < small[axis] for axis in left)
-            if certain and send - now <= longest:
+            if certain and soon:
                 break
-            latest = min(now + longest, send - usual - spread)
+            latest = min(now + BLIND_S, send - usual - spread)
             now = yield from wait(latest if sure else min(latest, now + max(0.3, 0.5 * (latest - now))))
             reply = yield from self.helm.send(Status())
             now = reply.received
@@ -215,35 +225,37 @@ class Turning:
         """Turns slowly to see which way that is; it goes on turning, unless a stop may be near."""
         levels = [0, 0, 0]
         for axis in axes if self.helm.skill.diagonals else axes[:1]:
-            levels[axis] = self._probing(axis)
-        now = (yield from self.helm.start((levels[0], levels[1], levels[2]))).received
-        for _ in range(PROBE_LOOKS):
-            now = yield from wait(now + PROBE_S)
+            levels[axis] = 1 if self.helm.aim[axis] > self.helm.course.origin[axis] else -1
+        turning = [axis for axis in (PAN, TILT) if levels[axis]]
+        begun = now = (yield from self.helm.start((levels[0], levels[1], levels[2]))).received
+        for look in range(PROBE_LOOKS):
+            now = yield from wait(now + (PROBE_S if look else self._probes_for(turning)))
             reply = yield from self.helm.send(Status())
             now, reading = reply.received, cast(Reading, reply.result)
             if self._see_senses(reading, levels) or not any(self.helm.course.levels):
                 break
-            if any(self._confined(axis, abs(level)) for axis, level in enumerate(levels) if level):
+            if now + PROBE_S > begun + min(map(self._alone, turning)):
                 now = yield from self.helm.stop(now)
-        for axis in (PAN, TILT):
-            if levels[axis] and not self.helm.skill.senses[axis].sure:  # an end stop may be in its way
+        for axis in turning:
+            if not self.helm.skill.senses[axis].sure:  # an end stop may be in its way
                 self.helm.course.flip(axis)
         self.helm.course.read(reply, reading)
         return now
 
-    def _probing(self, axis: int) -> int:
-        """A slow speed towards the goal, which as far as is guessed reaches no stop before the first look."""
-        here, (low, high) = self.helm.course.origin[axis], self.helm.limits.ranges[axis]
-        timing, pace = self.helm.skill.timing, self.helm.skill.paces[axis]
-        most = min(PROBE_DEG_S, min(high - here, here - low) / (PROBE_S + 2 * timing.usual + timing.tail))
-        speed = max((speed for speed in pace.speeds if pace.guess[speed - 1] <= most), default=1)
-        return speed * (1 if self.helm.aim[axis] > here else -1)
+    def _probes_for(self, axes: list[int]) -> float:
+        """How long a probe turns before it is looked at: where there is time and room it tells its speed, too.
 
-    def _confined(self, axis: int, speed: int) -> bool:
-        """Whether a stop may be in the way of a second look."""
+        It is the slowest one, which ends most moves, and known it does so without another look.
+        """
+        paces, aim, here = self.helm.skill.paces, self.helm.aim, self.helm.course.origin
+        way = max(abs(aim[axis] - here[axis]) / paces[axis].rate(1) for axis in axes)
+        return max(PROBE_S, min(PROBE_LONG_S, way, *map(self._alone, axes)))
+
+    def _alone(self, axis: int) -> float:
+        """How long an axis may turn at its slowest, whichever way, before a look that is in time for its stop."""
         here, (low, high) = self.helm.course.origin[axis], self.helm.limits.ranges[axis]
-        timing, rate = self.helm.skill.timing, FASTER * self.helm.skill.paces[axis].guess[speed - 1]
-        return min(high - here, here - low) < rate * (2 * (PROBE_S + timing.usual) + timing.usual + timing.tail)
+        timing, rate = self.helm.skill.timing, FASTER * self.helm.skill.paces[axis].guess[0]
+        return min(high - here, here - low) / rate - 2 * timing.usual - timing.tail
 
     def _see_senses(self, reading: Reading, levels: list[int]) -> bool:
         """Whether every axis that was probed has shown which way it goes."""

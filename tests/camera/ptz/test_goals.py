@@ -58,17 +58,21 @@ def test_a_calibrated_camera_takes_few_commands_from_its_first_goal_on(name: str
         for one in outcomes(PROFILES[name], random_goals(bounds.GOALS, seed), seed, calibrated=True)
     ]
     assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
-    assert max(one.commands for one in found[: bounds.GOALS]) <= bounds.COMMANDS
+    first = [one.commands for one in found[:: bounds.GOALS]]
+    assert sum(commands > bounds.COMMANDS for commands in first) <= 1
+    assert max(one.commands for one in found) <= bounds.COMMANDS + bounds.CORRECTION
     few = [one.commands <= bounds.COMMANDS for one in found]
     assert sum(few) >= bounds.CALIBRATED_WITHIN_COMMANDS * len(few)
     assert median(one.ratio for one in found) <= wanted(PROFILES[name])
 
 
 def test_where_beside_the_goal_will_do_it_is_met_with_fewer_commands_and_sooner() -> None:
-    profile, widest = PROFILES["ip3m-941w-2019"], [(pan, tilt, 0.0) for pan, tilt, _ in random_goals(bounds.GOALS, 1)]
-    exact, rough = Rig(profile), Rig(profile)
-    first = [exact.go(goal) for goal in widest]
-    beside = [rough.go(goal, near=BESIDE_DEG) for goal in widest]
+    first, beside = [], []
+    for seed in CALIBRATED_SEEDS:
+        exact, rough = (Rig(PROFILES["ip3m-941w-2019"], seed) for _ in range(2))
+        for pan, tilt, _ in random_goals(bounds.GOALS, seed):
+            first.append(exact.go((pan, tilt, 0.0)))
+            beside.append(rough.go((pan, tilt, 0.0), near=BESIDE_DEG))
     assert all(one.off <= BESIDE_DEG + 0.1 and one.rests and not one.pushed and not one.error for one in beside)
     assert median(one.commands for one in beside) < median(one.commands for one in first)
     assert median(one.seconds for one in beside) < 0.85 * median(one.seconds for one in first)

@@ -85,11 +85,11 @@ def test_a_goal_out_of_range_is_refused_with_the_range(pan: float, tilt: float, 
         LIMITS.goal(pan, tilt, zoom)
 
 
-def test_the_first_motion_of_an_axis_is_a_short_probe() -> None:
+def test_the_first_motion_of_an_axis_is_its_slowest() -> None:
     motors = Motors(mirror=False)
     drive(goto(LIMITS.goal(10.0, 60.0, 0.0), LIMITS, Skill(), 1060.0), motors)
     first = next(request for request in motors.sent if isinstance(request, Start))
-    assert first.speed == 2
+    assert first.speed == 1
 
 
 def test_zoom_is_reached_after_pan_and_tilt() -> None:
