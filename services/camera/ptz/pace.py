@@ -33,6 +33,7 @@ SLOWEST = 0.05
 FLOOR = 0.2  # of the guess: what other speeds teach of one makes it no slower
 DRIFT = 0.002  # of each rate, per motion: motors age
 DOUBT_AGAIN = 0.01  # of the first guess's covariance, when what is known was wrong
+AGAIN_DEG = 0.5  # no reading is so far off: an axis that rests there has come another way than was known
 ROUNDS = 3  # of learning from one reading: a speed that is reached late bends what it shows
 OUTLIER = 3.0  # standard deviations; beyond, a reading counts for less
 
@@ -136,7 +137,9 @@ class Pace:
         expected, slope = self._slope(told, seen)
         wrong = seen.travel - expected
         likely = float(slope @ self.cov @ slope) + seen.noise**2
-        if wrong * wrong > OUTLIER**2 * likely and not self.velocity(told, self.seen_at(seen.at, seen.late)):
+        if wrong * wrong > max(AGAIN_DEG**2, OUTLIER**2 * likely) and not self.velocity(
+            told, self.seen_at(seen.at, seen.late)
+        ):
             self.cov = self.cov + DOUBT_AGAIN * _prior(self.guess)[1]
         before, cov = self.mean, self.cov
         for _ in range(ROUNDS):  # the iterated extended Kalman filter: the slope is that where this leads

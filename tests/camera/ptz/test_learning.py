@@ -105,3 +105,13 @@ def test_what_is_wrong_although_it_was_known_well_is_learnt_anew(faster: float) 
         pace.learn(told, Seen(1010.0, 0.0, rests, 0.3))
     assert missed[0] > 5.0
     assert missed[-1] < 0.5
+
+
+@pytest.mark.parametrize(("off", "forgotten"), [(0.3, False), (1.5, True)])
+def test_two_readings_that_dither_do_not_make_what_was_known_forgotten(off: float, forgotten: bool) -> None:
+    """Where a short turn began was read as well as where it ended: both together may be beside by 0.3 degrees."""
+    pace = Pace(PAN_RATES)
+    pace.cov *= 1e-4
+    told = [Told(1000.0, 0.0, 1), Told(1001.5, 0.0, 0)]
+    pace.learn(told, Seen(1010.0, 0.0, pace.travel(told, 1010.0) + off, 0.08))
+    assert (pace.doubt(8) > 0.05 * pace.rate(8)) is forgotten
