@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from services.camera.plan import Plan, wait
-from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.course import END, GRID, PAN, TILT, ZOOM
 from services.camera.ptz.goal import Goal, Limits
 from services.camera.ptz.helm import Helm, levels_of
 from services.camera.ptz.move import Arrival, goto
@@ -26,6 +26,8 @@ LEG_S = 1.5  # each leg turns so long, or less where there is less room
 ROOM = 0.3  # of the way to the end stop that a leg may use
 FIRST_MOVE_DEG = 12.0  # shows the signs, and what the firmware honours
 MOVE_S = 60.0
+ZOOMS = (1, -1, 1, -1)
+LOOKS = 20  # on the way of zoom
 PLACES = 40  # for the relative form, whose scale they teach: some way from one to the next, and each at another zoom
 MARGIN = 0.15  # of a range, at either end, in which none of them lies
 
@@ -49,6 +51,7 @@ def calibrate(limits: Limits, skill: Skill) -> Plan[Arrival]:
     for axis in (PAN, TILT):
         for speed in skill.paces[axis].speeds:
             now = yield from _leg(limits, skill, axis, speed)
+    now = yield from _zoom(limits, skill, now)
     for goal in _places(limits):
         now = (yield from goto(goal, limits, skill, now + MOVE_S)).at
         if all(skill.honours.get(form) != "yes" for form in skill.scales):
@@ -96,6 +99,27 @@ def _leg(limits: Limits, skill: Skill, axis: int, speed: int) -> Plan[float]:
     helm.course.read(reply, cast(Reading, reply.result))
     now = yield from helm.stop((yield from wait(max(reply.received, ends))))
     _, now = yield from helm.rest(now)
+    return now
+
+
+def _zoom(limits: Limits, skill: Skill, now: float) -> Plan[float]:
+    """Zoom from one end to the other and back, looked at all the way: its coarse steps tell its speed by and by."""
+    for level in (-1, *ZOOMS):
+        reading, now = yield from settle()
+        helm = Helm(Goal(limits.pose(reading)), limits, skill)
+        helm.stand(reading)
+        end, grid = limits.zoom[level > 0], skill.zoom_grid or GRID
+        now = (yield from helm.start((0, 0, level))).received
+        for _ in range(LOOKS):
+            reply = yield from helm.send(Status())
+            now, reading = reply.received, cast(Reading, reply.result)
+            helm.course.read(reply, reading)
+            if abs(reading.zoom - end) < END:
+                break
+        last = grid / skill.paces[ZOOM].rate(1)  # to the very end, which a coarse reading does not tell
+        now = yield from helm.stop((yield from wait(now + last)))
+        if abs(reading.zoom - end) < END:
+            skill.zoomed = (reading.zoom, end)
     return now
 
 

@@ -57,3 +57,14 @@ def test_parts_of_the_picture_are_known_at_every_zoom_afterwards_where_the_firmw
     doubts = [planes.doubt(planes.weights(axis, zoom)) for axis in (0, 1) for zoom in (0.0, 4.0, 8.0)]
     assert max(doubts) < 0.1  # of the part; 0.5 before
     assert motors.pushed == 0.0
+
+
+@pytest.mark.parametrize(("rate", "grid"), [(2.0, 2.0), (5.0, 2.0), (4.0, 1.0)])
+def test_how_fast_zoom_is_is_known_afterwards_although_it_is_told_in_coarse_steps(rate: float, grid: float) -> None:
+    motors, skill, limits = Motors(zoom_rate=rate, zoom_grid=grid, acceleration=120.0), Skill(), Limits()
+    run, _ = drive(calibrate(limits, skill), motors, limit_s=300.0)
+    assert run.error is None
+    assert skill.paces[2].rate(1) == pytest.approx(rate, rel=0.1)
+    assert skill.paces[2].doubt(1) < 0.1 * rate
+    assert motors.pushed == 0.0
+    assert not motors.moving
