@@ -5,6 +5,7 @@ Which speeds a leg has is chosen in `leg.py`; what is done after it, in `move.py
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf
 from typing import cast
 
@@ -18,6 +19,7 @@ from services.camera.ptz.outlook import BLIND_S, Way
 from services.camera.ptz.zooming import Zooming
 from services.camera.requests import Reading, Refused, Status
 
+STOPS, STOPS_COMMANDS = 3.0, 2  # answers that a stop and a look at rest take; and commands
 RUNGS = 5  # legs without a rest between them
 RECKONED_DEG = 0.4
 BESIDE_DEG = 0.2  # less is not worth to be put right
@@ -67,8 +69,8 @@ class Turning:
         for _ in range(RUNGS):
             now = yield from self._swing(axes, now)
             leg, turning = self._choose(axes, now, zoom=zoom)
-            if leg.cost >= DANGER and any(self.helm.course.levels[:2]):
-                return (yield from self.helm.stop(now))  # from rest there will be a better one
+            if any(self.helm.course.levels[:2]) and leg.cost > min(DANGER, self._rested(axes, now, zoom=zoom)):
+                return (yield from self.helm.stop(now))
             if levels_of(turning) != tuple(self.helm.course.levels):
                 now = (yield from self.helm.start(levels_of(turning))).received
             now = yield from self._see_through(leg, turning, now)
@@ -90,7 +92,7 @@ class Turning:
         turned = [axis for axis in (PAN, TILT) if self.helm.course.told[axis]]
         if any(self.helm.reckoned(axis) > RECKONED_DEG for axis in turned):
             return []
-        return [axis for axis in turned if self._off(axis, now) > self.helm.near - SHARP_DEG]
+        return [axis for axis in turned if self._off(axis, now) > self.helm.near + SHARP_DEG]
 
     def _beside(self, now: float) -> list[int]:
         """The axes that rest beside the goal as far as is reckoned: while the other goes on, they can be put right."""
@@ -135,8 +137,20 @@ class Turning:
             return (yield from self.helm.start((levels[0], levels[1], levels[2]))).received
         return now
 
+    def _rested(self, axes: list[int], now: float, *, zoom: bool) -> float:
+        """What it costs to stop first: from rest any speed may be begun."""
+        free = {axis: replace(way, fastest=inf) for axis, way in self._ways(axes, now).items()}
+        left = self.helm.left - STOPS_COMMANDS - (ZOOM_COMMANDS if zoom else 0)
+        return STOPS * self.helm.skill.timing.usual + choose(free, self.helm.skill, left=left).cost
+
     def _choose(self, axes: list[int], now: float, *, zoom: bool) -> tuple[Leg, dict[int, int]]:
         """The next leg and its levels, from where it stands, or from where it will be when the start takes effect."""
+        ways = self._ways(axes, now)
+        left = self.helm.left - (ZOOM_COMMANDS if zoom else 0)
+        leg = choose(ways, self.helm.skill, left=left, runs=self._runs(ways))
+        return leg, {axis: part.speed * (sign(ways[axis].distance) or 1) for axis, part in leg.parts.items()}
+
+    def _ways(self, axes: list[int], now: float) -> dict[int, Way]:
         ways = {}
         for axis in axes:
             distance = self.helm.aim[axis] - self.helm.course.stopped(axis, now + self.helm.skill.timing.usual)
@@ -146,9 +160,7 @@ class Turning:
             room -= 2 * max(0.0, doubt - LOST_DEG)
             fastest = self._fastest_after(axis, abs(distance) + room) if self._runs_to(axis, distance) else inf
             ways[axis] = Way(distance, room, self.helm.skill.paces[axis], self.helm.near, fastest)
-        left = self.helm.left - (ZOOM_COMMANDS if zoom else 0)
-        leg = choose(ways, self.helm.skill, left=left, runs=self._runs(ways))
-        return leg, {axis: part.speed * (sign(ways[axis].distance) or 1) for axis, part in leg.parts.items()}
+        return ways
 
     def _runs_to(self, axis: int, distance: float) -> bool:
         """Whether an axis turns already, the right way."""
