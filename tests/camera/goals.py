@@ -222,12 +222,12 @@ def named() -> dict[str, Profile]:
     return {name: replace(profile) for name, profile in PROFILES.items()}
 
 
-def wanted(profile: Profile) -> float:
+def wanted(profile: Profile, *, calibrated: bool = False) -> float:
     """The bound of the median of time over least time."""
     if profile.position_abs == "pan-only":
         return bounds.MEDIAN_PAN_ONLY
     if profile.position_relative == "works" and not positions(profile):
-        return bounds.MEDIAN_RELATIVE
+        return bounds.MEDIAN_RELATIVE_CALIBRATED if calibrated else bounds.MEDIAN_RELATIVE
     return bounds.MEDIAN_POSITIONS if positions(profile) else bounds.MEDIAN_START_STOP
 
 

@@ -3,9 +3,9 @@
 A hop may begin while the last one, or a start at full speed, still turns. Where it leads depends on where the camera
 was just then: that is known when it was answered, not before, so the last hop of a long way leaves some degrees to
 one more that begins at rest. A late hop pushes nothing against a stop. Zoom turns by hops only, so where it takes
-long they begin sooner. A look on the last bit of the way tells whether to go on from where that leads. Not here: how an
-axis glides (`glide.py`), where it will rest (`landing.py`), how large the scale is (`planes.py`), what hops teach
-(`scale.py`).
+long they begin sooner. A look on the last bit of the way tells whether to go on from where that leads. Not here: the
+start at full speed before hops (`rush.py`), how an axis glides (`glide.py`), where it will rest (`landing.py`), how
+large the scale is (`planes.py`), what hops teach (`scale.py`).
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from services.camera.ptz.course import PAN, TILT, ZOOM, ZOOM_SLOWS_S
 from services.camera.ptz.driving import at_rest
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
-from services.camera.ptz.helm import Helm, levels_of, sign
+from services.camera.ptz.helm import Helm
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE
-from services.camera.ptz.planes import Planes
+from services.camera.ptz.planes import Planes, Scale
+from services.camera.ptz.rush import rush
 from services.camera.ptz.scale import Hop, Turned
 from services.camera.ptz.skill import RelativeForm
 from services.camera.requests import MoveOver, Reading, Refused, Reply, Status
@@ -36,9 +37,9 @@ MIDST_DEG = 6.0  # what is farther off was out of reach, and not the fault of a 
 SHARP_DEG = 0.05  # what the reckoning leaves open, at least
 FAR_DEG = 360.0  # no hop goes farther
 TRY_DEG = 12.0  # a first hop, whose scale is a guess
-BULK = 1.5  # answers: a start at full speed that is shorter is not worth it
-LATE_LOOK = 2.0  # answers: a look as late as that does not delay what it is for
-LATEST = 2.0  # spreads: when a hop acted that was answered later is not known well enough to foretell where it leads
+SHORT, KNOWN = 0.5, 0.4  # spreads: a hop in flight ends before its goal, where no more of the doubt is left
+FLIES_DEG_S = 8.0  # of a hop that took the place of another one: from where is not known well enough then
+LATEST = 1.25  # spreads: when a hop acted that was answered later is not known well enough to foretell where it leads
 RESTS_S = 0.02  # after it is reckoned to rest, where that was foretold
 FEW = 2  # commands, for a hop from rest and a look
 
@@ -63,9 +64,9 @@ class Hopping:
         here = self.helm.course.origin
         self.zooms = abs(self.helm.aim[ZOOM] - here[ZOOM]) > self.helm.zoom_near / 2
         for form in self._forms():
-            if self.turns >= TURNS or self.helm.left < FEW:
-                break
             self.form = form
+            if self.turns >= TURNS or (self.helm.left < FEW and self._honoured != "yes"):
+                break
             if not self.helm.beside(here) and not self._takes_zoom():
                 continue  # zoom alone is missing, and hops leave it
             try:
@@ -95,6 +96,10 @@ class Hopping:
         self.helm.rests = arrives
         about = 0.0 if self._exact(to) else ABOUT_DEG
         reading, now, _ = yield from at_rest(self.helm, arrives, to, now, certain=certain, about=about, hops=True)
+        if certain and self._timely:
+            known = landing.doubts(self.helm.skill, self.form, self.hops, self.foretold)
+            rest = [landing.read(*one) for one in zip(self.helm.limits.pose(reading), known, strict=False)]
+            landing.stray(self._scale, self.glides, known, rest)
         scale.learn(self.helm.skill, self.form, self.hops, to, self.helm.limits, reading)
         self.helm.stand(reading)
         return reading, now
@@ -102,13 +107,13 @@ class Hopping:
     def _exact(self, to: Pose) -> bool:
         """Whether it surely ends at the goal, so that a look on its last bit of way is enough."""
         off = max(abs(self.helm.aim[axis] - to[axis]) for axis in (PAN, TILT))
-        skill, unsure = self.helm.skill, scale.unsure(self.helm.skill.scales[self.form], self.hops)
+        skill, unsure = self.helm.skill, scale.unsure(self._scale, self.hops)
         return not skill.says_late and off + 2 * unsure <= EXACT_DEG and scale.timed(skill, self.hops)
 
     def _land(self, now: float) -> Plan[tuple[Reading, float] | None]:
         """Looks on the last bit of way, and hops on where that leads beside the goal; None: it is not sure where."""
         helm = self.helm
-        while helm.left > 0 and self.latest <= LATEST * helm.skill.timing.spread:
+        while helm.left > 0 and self._timely:
             doubts = landing.doubts(helm.skill, self.form, self.hops, self.foretold)
             look = landing.sight(helm.skill, self.glides, doubts)
             if look is None:
@@ -118,6 +123,7 @@ class Hopping:
             reading, now = cast(Reading, reply.result), reply.received
             arrives = max(self._ends(), self.glides[ZOOM].ends)
             ends = landing.ends(helm.skill, self.glides, doubts, reply, helm.limits.pose(reading))
+            landing.stray(self._scale, self.glides, doubts, ends)
             zoomed = abs(helm.goal.pose[ZOOM] - reading.zoom) <= helm.zoom_near or not self._takes_zoom()
             verdict = landing.judge(helm.aim, helm.near, ends) if zoomed else "unsure"
             if verdict == "unsure":
@@ -140,13 +146,25 @@ class Hopping:
         return self.helm.skill.honours.get(self.form, "unknown")
 
     @property
+    def _timely(self) -> bool:
+        """Whether it is known when the hops acted, and from where the last one goes."""
+        if len(self.hops) > 1 and max(map(abs, self.hops[-1].speeds[:ZOOM])) > FLIES_DEG_S:
+            return False
+        return self.latest <= LATEST * self.helm.skill.timing.spread
+
+    @property
+    def _scale(self) -> Scale:
+        return self.helm.skill.scales[self.form]
+
+    @property
     def _planes(self) -> Planes:
-        return self.helm.skill.scales[self.form].planes
+        return self._scale.planes
 
     def _chain(self, now: float) -> Plan[float]:
         """To where the goal can be reached, there in flight, and from rest what is left then."""
-        timing = self.helm.skill.timing
-        now = yield from self._rush(now)
+        timing, zoom = self.helm.skill.timing, self.helm.course.origin[ZOOM]
+        reaches = (self._reach(PAN, zoom), self._reach(TILT, zoom))
+        now = yield from rush(self.helm, reaches, now, zooms=self._takes_zoom())
         for _ in range(MOST):
             now = yield from self._send(now)
             off = {axis: abs(self.helm.aim[axis] - self.glides[axis].goal) for axis in (PAN, TILT)}
@@ -158,72 +176,8 @@ class Hopping:
             now = yield from wait(max(now, follows - timing.usual))
         return now
 
-    def _rush(self, now: float) -> Plan[float]:
-        """A way that takes several hops begins with a start at full speed, while a late answer does no harm."""
-        helm, timing = self.helm, self.helm.skill.timing
-        ways = {axis: helm.aim[axis] - helm.course.origin[axis] for axis in (PAN, TILT)}
-        rates = {axis: helm.skill.paces[axis].rate(helm.skill.paces[axis].speeds[-1]) for axis in ways}
-        lead = max(ways, key=lambda axis: abs(ways[axis]) / rates[axis])
-        safe = abs(ways[lead]) + self._room(lead, ways[lead]) - rates[lead] * timing.tail - self._brakes(lead)
-        held = min(abs(ways[lead]) - self._before(lead), safe) / rates[lead]
-        held = min(held, self._whole(lead, ways[lead]) - self._zooming())
-        if held < BULK * timing.usual:
-            return now
-        turning = {axis: self._along(axis, way, held) * sign(way) for axis, way in ways.items() if helm.skill.diagonals}
-        turning[lead] = helm.skill.paces[lead].speeds[-1] * sign(ways[lead])
-        now = (yield from helm.start(levels_of(turning))).received
-        pace, level, way = helm.skill.paces[lead], abs(turning[lead]), sign(ways[lead])
-        end = helm.course.origin[lead] + way * (held * rates[lead] + pace.change(level) * pace.rate(level) / 2)
-        for early in (True, False):  # once soon, as long as the speed is not known, and once before the end
-            ends = helm.course.end_for(lead, end, now)
-            unsure = helm.course.doubt(lead, ends) / rates[lead]
-            look = ends - 2 * timing.usual - min(timing.tail, LATE_LOOK * timing.usual) - unsure
-            if look < now or (early and pace.known(level)):
-                continue
-            yield from wait(min(look, now + timing.usual) if early else look)
-            reply = yield from helm.send(Status())
-            now = reply.received
-            helm.course.read(reply, cast(Reading, reply.result))
-        return (yield from wait(max(now, helm.course.end_for(lead, end, now) - timing.usual)))
-
-    def _whole(self, axis: int, way: float) -> float:
-        """How long an axis takes from rest to rest."""
-        pace = self.helm.skill.paces[axis]
-        return abs(way) / pace.rate(pace.speeds[-1]) + pace.change(pace.speeds[-1])
-
-    def _zooming(self) -> float:
-        """How long zoom takes, which a start at full speed would put off."""
-        if not self._takes_zoom():
-            return 0.0
-        pace = self.helm.skill.drives[ZOOM]
-        return abs(self.helm.aim[ZOOM] - self.helm.course.origin[ZOOM]) / pace.rate(1)
-
     def _takes_zoom(self) -> bool:
         return self.zooms and self.helm.skill.honours.get(scale.zooms(self.form)) != "no"
-
-    def _before(self, axis: int) -> float:
-        """How far before its goal a hop should begin that leads there: within its reach, and before it would brake."""
-        pace, reach = self.helm.skill.paces[axis], self._reach(axis, self.helm.course.origin[ZOOM])
-        spread = pace.rate(pace.speeds[-1]) * self.helm.skill.timing.spread
-        return max((reach + self._brakes(axis)) / 2, reach - spread)
-
-    def _brakes(self, axis: int) -> float:
-        """How far it goes while it brakes from its top speed."""
-        pace = self.helm.skill.paces[axis]
-        return pace.rate(pace.speeds[-1]) ** 2 * pace.other(HALF_CHANGE)
-
-    def _room(self, axis: int, way: float) -> float:
-        low, high = self.helm.limits.ranges[axis]
-        return high - self.helm.aim[axis] if way > 0 else self.helm.aim[axis] - low
-
-    def _along(self, axis: int, way: float, held: float) -> int:
-        """The speed of an axis in the rush: it stays before its goal, and if that ends late before its stop."""
-        pace, room = self.helm.skill.paces[axis], self._room(axis, way)
-        for speed in reversed(pace.speeds):
-            rate = pace.rate(speed)
-            if rate * held <= abs(way) and rate * (held + self.helm.skill.timing.tail) <= abs(way) + room:
-                return speed
-        return 0
 
     def _reach(self, axis: int, zoom: float) -> float:
         """How far one hop goes at most, degrees."""
@@ -232,11 +186,12 @@ class Hopping:
     def _send(self, now: float, most: float = FAR_DEG) -> Plan[float]:
         """One hop towards the goal, from where it will be when that takes effect."""
         helm = self.helm
-        there = [self._at(axis, now + helm.skill.timing.usual)[0] for axis in range(3)]
+        there, speeds = zip(*(self._at(axis, now + helm.skill.timing.usual) for axis in range(3)), strict=True)
         parts = []
         for axis in (PAN, TILT):
             reach = min(most, self._reach(axis, there[ZOOM]))
-            way = min(reach, max(-reach, helm.aim[axis] - there[axis]))
+            short = SHORT * speeds[axis] * helm.skill.timing.spread if self._scale.share < KNOWN else 0.0
+            way = min(reach, max(-reach, helm.aim[axis] - short - there[axis]))
             parts.append(helm.skill.senses[axis].sign * self._planes.part(axis, way, there[ZOOM]))
         right, down = (min(1.0, max(-1.0, part)) for part in parts)
         zooms = self._takes_zoom() and most > TRY_DEG
@@ -261,6 +216,7 @@ class Hopping:
         )
         right, down = (self._planes.angle(axis, part, poses[ZOOM][0]) for axis, part in enumerate((pan, tilt)))
         turned = None if self.glides else self._turned(acted, reply, late)
+        rested = max(0.0, acted - self._ends()) if self.glides else 0.0
         self.glides = []
         for axis, (way, (place, speed)) in enumerate(zip((right, down, request.zoom), poses, strict=True)):
             low, high = helm.limits.ranges[axis]
@@ -271,7 +227,7 @@ class Hopping:
             self.glides.append(Glide(acted, place, speed, goal, top, 1 / slow, reply.received))
         begun, speeds = ((pan, tilt, zoom) for pan, tilt, zoom in zip(*poses, strict=True))
         tops = (self.glides[PAN].top, self.glides[TILT].top, self.glides[ZOOM].top)
-        self.hops.append(Hop(begun, (pan, tilt), (right, down, request.zoom), speeds, tops, turned))
+        self.hops.append(Hop(begun, (pan, tilt), (right, down, request.zoom), speeds, tops, turned, rested))
         helm.course.leave(begun)
 
     def _turned(self, acted: float, reply: Reply, late: float) -> tuple[Turned, Turned]:

@@ -55,6 +55,7 @@ class _Kept(BaseModel):
     beside: dict[str, Pair]
     presets: dict[int, Triple]
     scales: dict[RelativeForm, dict[str, _Law]] = {}
+    strayed: dict[RelativeForm, Pair] = {}
 
 
 class Kept:
@@ -131,6 +132,7 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
             form: {one.law.name: _Law(likely=one.likely, **_kept_filter(one).model_dump()) for one in scale.laws}
             for form, scale in skill.scales.items()
         },
+        strayed={form: (scale.strayed, scale.looks) for form, scale in skill.scales.items()},
     )
 
 
@@ -148,6 +150,7 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
         *zip((*skill.paces, *skill.drives), (*kept.paces, *kept.drives), strict=True)
     ]
     for form, scale in skill.scales.items():
+        scale.strayed, scale.looks = kept.strayed.get(form, (scale.strayed, scale.looks))
         for planes in scale.laws:
             law = kept.scales.get(form, {}).get(planes.law.name)
             if law is not None:

@@ -18,6 +18,7 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, READ_LATE, READ_PART
+from services.camera.ptz.planes import Scale
 from services.camera.ptz.scale import Hop
 from services.camera.ptz.skill import NEAR_DEG, RelativeForm, Skill
 from services.camera.requests import Reading, Reply
@@ -27,18 +28,17 @@ LEFT_DEG = (1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, when the look is of: th
 LEFT_LEVELS = 0.3  # of zoom's way, at most, where it is told in coarse steps
 EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
 EXPECTED_NOISE_DEG = 0.18  # and whose own noise is no more
-LATER = 0.3  # of the spread of answers: a look is so much later, so that a quick one is not before its time
+LATER = 0.1  # of the spread of answers: a look is so much later, so that a quick one is not before its time
 
 # What is known without a look, and how exact one is; standard deviations.
-BELIEVED = 0.35  # of the doubt that is kept of a hop's scale and place: large, so that they go on learning
 LEAST_DEG = 0.05  # of where hops lead
+ENDED = 2.0  # deviations: when the hop ended whose place another one took
 FAR = 2.0  # such deviations of the time: what rests by now need not have rested a moment before
-START = 1.5  # of the time from where it may have been to rest, when the last hop took the place of one that ended
 READ_DEG = 0.06  # of a reading
 LEAST_S = 0.004  # of the moment that a look tells of
 STEP_DEG = 0.05  # of the goal: what it would change of a look
 LEAST_SHOWN = 0.1  # of a change of the goal; before it brakes a look shows none
-UNSEEN = 0.5  # of the doubt of the goal is noise of a look that shows nothing of the goal
+UNSEEN = 0.15  # of the doubt of the goal is noise of a look that shows nothing of the goal
 BENT = 0.3  # of how far off it ends: the reckoning of that may be wrong by so much
 
 # What follows from it.
@@ -46,7 +46,7 @@ SURE = 2.25  # standard deviations that it may end farther off than is likeliest
 MISSED = 1.25  # and nearer, for a hop to go on from there: one too many does little harm
 OUTLIER = 2.0  # of them; a look farther off its course than that is of something else
 ARRIVES_DEG = 0.45  # it ends at its goal if it ends so near at the worst: 0.5 is promised
-NOISE_DEG = 0.2  # a look whose noise is more does not tell that
+NOISE_DEG = 0.4  # a look whose noise is more does not tell that
 RESTED_S = 0.02  # after it is reckoned to rest: what still moves then does not go as was reckoned
 GO_ON_DEG = 0.25  # doubt of where it ends, up to which a hop goes on from there
 TEACHES = 0.5  # of the doubt before it: a look that leaves less tells how far hops went
@@ -60,7 +60,7 @@ class Doubts:
 
     `goal`: how far it was to go, degrees; `place`: where that began, degrees, and then all of its way is beside;
     `read`: a reading, degrees; `time`: the moment that it tells of, seconds; `change`: its acceleration, a share;
-    `start`: seconds that a hop in flight was sooner or later on its way.
+    `start`: seconds that a hop in flight was sooner or later on its way. `share`: what experience left of all that.
     """
 
     goal: float
@@ -69,6 +69,7 @@ class Doubts:
     time: float
     change: float
     start: float = 0.0
+    share: float = 1.0
 
     @property
     def end(self) -> float:
@@ -94,23 +95,48 @@ class End:
 
 def doubts(skill: Skill, form: RelativeForm, hops: Sequence[Hop], place: float) -> tuple[Doubts, Doubts]:
     """Those of pan and tilt on the way of a chain of hops; `place`: of where it began, beside what the hops tell."""
-    time = _time(skill, skill.timing.spread / 2)
+    share = skill.scales[form].share
+    time = _time(skill, skill.timing.spread / 2, share)
 
     def of(axis: int) -> Doubts:
         goal, before = scale.doubts(skill.scales[form], hops, axis)
         change = skill.paces[axis].other_doubt(HALF_CHANGE) / skill.paces[axis].other(HALF_CHANGE)
-        began = hypot(BELIEVED * before, place)
-        slows = 2 * skill.paces[axis].other(HALF_CHANGE)  # seconds for a change by one degree/s
-        start = START * sqrt(2 * slows * began) if len(hops) > 1 else 0.0
-        return Doubts(hypot(BELIEVED * goal, LEAST_DEG), began, READ_DEG, time, change, start)
+        began = hypot(share * before, place)
+        start = _start(skill, hops, axis, share * change)
+        return Doubts(hypot(share * goal, LEAST_DEG), began, READ_DEG, time, share * change, start, share)
 
     return of(PAN), of(TILT)
 
 
-def _time(skill: Skill, late: float) -> float:
+def _start(skill: Skill, hops: Sequence[Hop], axis: int, change: float) -> float:
+    """How much sooner or later than is reckoned the last hop is where it should be, seconds.
+
+    It may take longer itself, and the one whose place it took may not have ended when it acted; `change`: doubt of the
+    acceleration, a share.
+    """
+    before = ENDED * max(0.0, _lasts(skill, hops[-2], axis, change) - hops[-1].rested) if len(hops) > 1 else 0.0
+    return hypot(before, _lasts(skill, hops[-1], axis, change)) if hops else 0.0
+
+
+def _lasts(skill: Skill, hop: Hop, axis: int, change: float) -> float:
+    """How much longer a hop may take, or less: by its acceleration, and by its top speed as long as it has that."""
+    pace, way, top = skill.paces[axis], abs(hop.ways[axis]), hop.tops[axis]
+    slows = 2 * pace.other(HALF_CHANGE)  # seconds for a change by one degree/s
+    fast = max(0.0, way / top - top * slows)
+    return hypot(change * min(top * slows, sqrt(way * slows)), fast * pace.doubt(pace.speeds[-1]) / top)
+
+
+def stray(scale: Scale, glides: Sequence[Glide], known: Sequence[Doubts], told: Sequence[End]) -> None:
+    """Takes in how far off a look shows pan and tilt, over how far they might be: so experience leaves less doubt."""
+    for glide, doubts, end in zip(glides, known, told, strict=False):
+        noise = hypot(doubts.read, sqrt(max(0.0, end.noise**2 - doubts.read**2)) / doubts.share)
+        scale.stray((end.seen - glide.goal) / hypot(end.before / doubts.share, noise))
+
+
+def _time(skill: Skill, late: float, share: float) -> float:
     """Doubt of the moment that a look tells of which is answered so much later than usual, or sooner."""
     reads = skill.paces[PAN]
-    return hypot(reads.other_doubt(READ_LATE), reads.other_doubt(READ_PART) * late, LEAST_S)
+    return hypot(share * reads.other_doubt(READ_LATE), share * reads.other_doubt(READ_PART) * late, LEAST_S)
 
 
 def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> float | None:
@@ -151,7 +177,8 @@ def read(place: float, known: Doubts) -> End:
 def ends(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts], reply: Reply, pose: Pose) -> list[End]:
     """The ends of pan and tilt by the answer to a look that reads `pose`; odd where it rests too soon, or too late."""
     late = reply.received - reply.sent - skill.timing.usual
-    seen, known = skill.paces[PAN].seen_at(reply.sent, late), [replace(one, time=_time(skill, late)) for one in known]
+    seen = skill.paces[PAN].seen_at(reply.sent, late)
+    known = [replace(one, time=_time(skill, late, one.share)) for one in known]
     moving, over = cast(Reading, reply.result).moving, seen - max(glide.ends for glide in glides)
     if skill.tells_rest(moving) and over >= 0.0:
         return [read(pose[axis], known[axis]) for axis in (PAN, TILT)]

@@ -9,7 +9,7 @@ Pure. What a hop tells: `scale.py`.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import atan, degrees, exp, hypot, log, radians, sin, tan
+from math import atan, degrees, exp, hypot, log, radians, sin, sqrt, tan
 
 import numpy as np
 
@@ -22,6 +22,8 @@ BENT = 0.2  # of what was off: a tangent is no straight line
 AXES = 2
 FORGETS = 0.95  # what a law has foretold counts so much with each hop more
 UNLIKELY = 2.0  # a law that is not the first one, before anything was seen; a logarithm
+STRAYED, FIRST_LOOKS, MOST_LOOKS = 0.6, 8, 20  # a guess that counts as so many looks; more are not remembered
+MARGIN, LEAST_SHARE = 1.25, 0.12  # experience leaves so much more doubt than it shows, and at least so much
 OUT = 3.0  # standard deviations: what is farther off tells no more against a law
 
 
@@ -122,10 +124,26 @@ class Planes:
 
 @dataclass
 class Scale:
-    """One form, by each law that it may follow; `off`: how far from where they should its hops end, over their way."""
+    """One form, by each law that it may follow; `off`: how far from where they should its hops end, over their way.
+
+    `strayed`: the mean square of how far off they were seen, over how far they may be by all that is learnt; `looks`:
+    of so many.
+    """
 
     laws: tuple[Planes, ...]
     off: float = 0.0
+    strayed: float = STRAYED**2
+    looks: float = FIRST_LOOKS
+
+    @property
+    def share(self) -> float:
+        """Of all doubt about the end of hops, what experience leaves."""
+        return min(1.0, max(LEAST_SHARE, MARGIN * sqrt(self.strayed)))
+
+    def stray(self, off: float) -> None:
+        """A look showed hops so far off, over how far they may be by all that is learnt."""
+        self.looks = min(MOST_LOOKS, self.looks + 1)
+        self.strayed += (min(1.0, off * off) - self.strayed) / self.looks
 
     @property
     def planes(self) -> Planes:

@@ -41,7 +41,7 @@ class Hop:
     """Where one began, by which parts and how far it should go, how fast each axis was then, and can be.
 
     `parts` as the readings count, of pan and tilt; the others in degrees and levels. `turned`: what pan and tilt did
-    before, where the hop is the first one.
+    before, where the hop is the first one; `rested`: how many seconds they had, where another one was before.
     """
 
     begun: Pose
@@ -50,6 +50,7 @@ class Hop:
     speeds: Pose
     tops: Pose
     turned: tuple[Turned, Turned] | None
+    rested: float
 
 
 def zooms(form: RelativeForm) -> str:

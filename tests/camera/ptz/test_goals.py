@@ -58,17 +58,23 @@ def test_a_calibrated_camera_takes_few_commands_from_its_first_goal_on(name: str
         for one in outcomes(PROFILES[name], random_goals(bounds.GOALS, seed), seed, calibrated=True)
     ]
     assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
-    first = [one.commands for one in found[:: bounds.GOALS]]
-    assert sum(commands > bounds.COMMANDS for commands in first) <= 1
     assert max(one.commands for one in found) <= bounds.COMMANDS + bounds.CORRECTION
     few = [one.commands <= bounds.COMMANDS for one in found]
-    assert sum(few) >= bounds.CALIBRATED_WITHIN_COMMANDS * len(few)
-    assert median(one.ratio for one in found) <= wanted(PROFILES[name])
+    within = bounds.DITHERING_WITHIN_COMMANDS if PROFILES[name].status_dither else bounds.CALIBRATED_WITHIN_COMMANDS
+    assert sum(few) >= within * len(few)
+    assert median(one.ratio for one in found) <= wanted(PROFILES[name], calibrated=True)
+
+
+def test_no_first_goal_is_crept_to() -> None:
+    """With few commands left a slow leg costs none of them, but nobody waits for it: a stop first costs two."""
+    profile = PROFILES["ip3m-943b"]
+    first = [one for seed in range(60) for one in outcomes(profile, random_goals(3, seed), seed)]
+    assert max(one.seconds for one in first) < 30.0
 
 
 def test_where_beside_the_goal_will_do_it_is_met_with_fewer_commands_and_sooner() -> None:
     first, beside = [], []
-    for seed in CALIBRATED_SEEDS:
+    for seed in SEEDS:
         exact, rough = (Rig(PROFILES["ip3m-941w-2019"], seed) for _ in range(2))
         for pan, tilt, _ in random_goals(bounds.GOALS, seed):
             first.append(exact.go((pan, tilt, 0.0)))

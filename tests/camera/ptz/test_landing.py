@@ -9,7 +9,8 @@ import pytest
 
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
-from services.camera.ptz.landing import Doubts, End, at_end, ends, foretell, judge, read
+from services.camera.ptz.landing import Doubts, End, at_end, doubts, ends, foretell, judge, read
+from services.camera.ptz.scale import Hop
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Reading, Reply, Status
 
@@ -58,6 +59,22 @@ def test_a_look_that_is_too_far_off_is_odd_unless_so_much_was_in_doubt() -> None
     assert foretell(WAY, LATE, place, KNOWN).odd
     assert not foretell(WAY, LATE, place, replace(KNOWN, goal=1.0)).odd
     assert not foretell(WAY, LATE, place, replace(KNOWN, place=1.0)).odd
+
+
+def test_where_a_long_way_at_a_speed_that_is_not_quite_known_is_over_a_look_tells_less() -> None:
+    skill, still = Skill(), (0.0, 0.0, 0.0)
+    skill.paces[0].cov *= 1e-3
+
+    def hop(way: float) -> Hop:
+        return Hop(still, (way / 180.0, 0.0), (way, 0.0, 0.0), still, (45.0, 27.0, 4.0), None, 0.0)
+
+    short, far = (doubts(skill, "moveRelatively", [hop(way)], 0.0)[0].start for way in (20.0, 170.0))
+    assert short < 0.02 < far / 3
+    after = [
+        doubts(skill, "moveRelatively", [hop(170.0), replace(hop(2.0), rested=rested)], 0.0)[0] for rested in (0.0, 1.0)
+    ]
+    assert after[0].start > far / 2  # the hop before may not have been over
+    assert after[1].start < 0.02
 
 
 @pytest.mark.parametrize("way", [0.0, 1e-9, -1e-9, -30.0])

@@ -74,6 +74,7 @@ def test_what_was_learnt_of_it_is_kept(tmp_path: Path) -> None:
     point, _, turn = skill.scales["Position"].laws
     seen(point, 0, 0.0, 1.3)
     turn.likely = 5.0
+    skill.scales["Position"].stray(0.1)
     kept = Kept(tmp_path, "ip1")
     kept.recall(identity, skill)
     kept.save(skill)
@@ -82,6 +83,20 @@ def test_what_was_learnt_of_it_is_kept(tmp_path: Path) -> None:
     assert known.at(4.0) == pytest.approx(point.at(4.0))
     assert known.doubt(known.weights(0, 0.0)) < 0.1
     assert again.scales["Position"].planes.law is TURN
+    assert again.scales["Position"].share == skill.scales["Position"].share != Skill().scales["Position"].share
+
+
+def test_where_hops_end_as_reckoned_experience_leaves_little_doubt_until_one_strays() -> None:
+    scale = Skill().scales["Position"]
+    first = scale.share
+    for _ in range(60):
+        scale.stray(0.1)
+    assert 0.1 < scale.share < 0.2 < first
+    scale.stray(3.0)
+    assert scale.share > 0.2
+    for _ in range(40):
+        scale.stray(2.0)
+    assert scale.share == 1.0  # there is no more doubt than all that is learnt leaves
 
 
 @pytest.mark.parametrize("late", range(2, 7))

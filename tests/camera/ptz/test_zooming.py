@@ -12,9 +12,11 @@ LIMITS = Limits()
 
 
 def test_after_zooming_out_it_is_brought_to_the_very_end_where_that_matters() -> None:
-    motors, skill = Motors(zoom=0.4, acceleration=90.0), Skill(zoomed=(0.0, 0.4))
-    assert motors.reading().zoom == 0.0
-    drive(widest(LIMITS, skill, 1000.0), motors, now=1000.0)
+    motors, skill = Motors(zoom=6.0, acceleration=90.0, seed=6), Skill()
+    run, took = drive(goto(LIMITS.goal(95.0, 25.0, 0.0), LIMITS, skill, 1060.0), motors)
+    assert run.error is None
+    assert motors.pose[2] > 0.0
+    drive(widest(LIMITS, skill, 1000.0 + took), motors, now=1000.0 + took)
     assert motors.pose[2] == 0.0
     motors.sent.clear()
     drive(widest(LIMITS, skill, 1100.0), motors, now=1100.0)
