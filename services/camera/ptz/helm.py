@@ -22,6 +22,7 @@ PAIR_S = 0.25  # between two readings that are compared
 UNSURE_LEVELS = 0.1  # it is not said to stand at the very end, which it may just have missed
 FOREVER = 1e12
 WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
+LATE_PART = 0.85  # of how late an answer may be, where a motion that it begins is ended only after it
 SURPRISES = 0.2  # of what was known before is replaced by each rest
 DIRECTIONS = {direction.value: direction for direction in Direction}
 COMMANDS = 10  # a move should need no more: 12 are promised, and an answer may come late
@@ -145,6 +146,14 @@ class Helm:
     def reckoned(self, axis: int) -> float:
         """How far off the reckoned place of rest of an axis may be, degrees."""
         return 2 * self.skill.surprise * self._fastest(axis)
+
+    def fastest(self, axis: int, left: float) -> float:
+        """The rate with which an axis that turns may go on, so many degrees before its stop.
+
+        The answer to that may come late, and only then it can be ended.
+        """
+        timing, rate = self.skill.timing, self.skill.paces[axis].rate(abs(self.course.levels[axis]))
+        return (left - LATE_PART * timing.tail * rate) / timing.usual
 
     def _fastest(self, axis: int) -> float:
         """The highest speed that an axis was told since it last stood."""

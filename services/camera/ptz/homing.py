@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 
 from services.camera.plan import Plan
 from services.camera.ptz import drive as own
@@ -70,9 +71,11 @@ class Homing:
         distance = helm.aim[axis] - helm.course.stopped(axis, now + helm.skill.timing.usual)
         low, high = helm.limits.ranges[axis]
         room = high - helm.aim[axis] if distance > 0 else helm.aim[axis] - low
+        fastest = inf
         if helm.course.levels[axis] * distance > 0:  # it turns on until a start takes effect
+            fastest = helm.fastest(axis, abs(distance) + room)
             room -= helm.skill.paces[axis].rate(abs(helm.course.levels[axis])) * helm.skill.timing.spread
-        return Way(distance, room, helm.skill.paces[axis], helm.near)
+        return Way(distance, room, helm.skill.paces[axis], helm.near, fastest)
 
     def _leg(self, way: Way) -> Leg:
         """A leg that will hardly end at the goal ends before it for sure: a slower one goes on from there."""

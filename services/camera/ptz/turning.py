@@ -32,7 +32,6 @@ PROBE_S = 0.35  # seen in the readings
 PROBE_LONG_S = 1.5  # shows how fast it is, too, and is harmless the wrong way
 FASTER = 2.0  # than is guessed, it may be
 MOVED_DEG = 0.3
-LATE_PART = 0.85  # of how late an answer may be, where a motion that it begins is ended only after it
 PROBE_LOOKS = 3
 LOOKS = 1  # readings in a leg
 MOST_LOOKS = 15
@@ -158,18 +157,13 @@ class Turning:
             room = high - self.helm.aim[axis] if distance > 0 else self.helm.aim[axis] - low
             doubt = self.helm.course.doubt(axis, now) if self.helm.course.told[axis] else 0.0
             room -= 2 * max(0.0, doubt - LOST_DEG)
-            fastest = self._fastest_after(axis, abs(distance) + room) if self._runs_to(axis, distance) else inf
+            fastest = self.helm.fastest(axis, abs(distance) + room) if self._runs_to(axis, distance) else inf
             ways[axis] = Way(distance, room, self.helm.skill.paces[axis], self.helm.near, fastest)
         return ways
 
     def _runs_to(self, axis: int, distance: float) -> bool:
         """Whether an axis turns already, the right way."""
         return self.helm.course.levels[axis] * distance > 0
-
-    def _fastest_after(self, axis: int, left: float) -> float:
-        """The rate with which it may go on when the answer to that comes late and only then it can be ended."""
-        timing = self.helm.skill.timing
-        return (left - LATE_PART * timing.tail * self._rate(axis)) / timing.usual
 
     def _runs(self, ways: dict[int, Way]) -> dict[int, int]:
         """The speeds of the axes that turn already, the right way."""
