@@ -99,10 +99,13 @@ def test_a_service_that_hangs_can_be_asked_where_and_goes_on(
     log = tmp_path / "log"
     with command(["serve", "simulated-home", "--config", str(config)], environment, log) as (process, _):
         process.send_signal(signal.SIGUSR1)
-        peers.wait_until(
-            lambda: "in serve" in log.read_text().partition("most recent call first")[2],
-            "the stacks, which are written line by line",
-        )
+        try:
+            peers.wait_until(
+                lambda: "in serve" in log.read_text().partition("most recent call first")[2],
+                "the stacks, which are written line by line",
+            )
+        except TimeoutError as error:
+            raise AssertionError(f"it ended with {process.poll()} and said: {log.read_text()}") from error
         process.send_signal(signal.SIGTERM)
         assert process.wait(10) == 0
 
