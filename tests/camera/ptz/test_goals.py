@@ -59,6 +59,8 @@ def test_a_calibrated_camera_takes_few_commands_from_its_first_goal_on(name: str
         for one in outcomes(PROFILES[name], random_goals(bounds.GOALS, seed), seed, calibrated=True)
     ]
     assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
+    first = [one.commands for one in found[:: bounds.GOALS]]
+    assert sum(commands > bounds.COMMANDS for commands in first) <= 1
     assert max(one.commands for one in found) <= bounds.COMMANDS + bounds.CORRECTION
     few = [one.commands <= bounds.COMMANDS for one in found]
     within = bounds.DITHERING_WITHIN_COMMANDS if PROFILES[name].status_dither else bounds.CALIBRATED_WITHIN_COMMANDS
