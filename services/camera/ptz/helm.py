@@ -25,7 +25,8 @@ WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
 LATE_PART = 0.85  # of how late an answer may be, where a motion that it begins is ended only after it
 SURPRISES = 0.2  # of what was known before is replaced by each rest
 DIRECTIONS = {direction.value: direction for direction in Direction}
-COMMANDS = 10  # a move should need no more: 12 are promised, and an answer may come late
+PROMISED = 12  # commands
+COMMANDS = 10  # a move should need no more: an answer may come late
 Levels = tuple[int, int, int]
 
 

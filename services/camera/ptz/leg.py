@@ -18,10 +18,8 @@ from services.camera.ptz.outlook import (
     Outlook,
     Way,
     chance,
-    feared,
     held_for,
     looks_in,
-    spread_of,
 )
 from services.camera.ptz.skill import Skill
 
@@ -63,7 +61,7 @@ class Leg:
 def choose(ways: dict[int, Way], skill: Skill, *, left: int = 12, runs: dict[int, int] | None = None) -> Leg:
     """The leg that probably costs least; `left` commands until it is read to be there; `runs`: what needs no start."""
     outlook, left = Outlook(ways, skill), max(0, left)  # what is spent is spent
-    legs = [leg for pair in _speeds(ways) for leg in _legs(ways, pair, skill)]
+    legs = [leg for pair in _speeds(ways) for leg in _legs(outlook, pair, left)]
     return min((_judged(leg, outlook, left, runs or {}) for leg in legs), key=lambda leg: leg.cost)
 
 
@@ -79,14 +77,16 @@ def _speeds(ways: dict[int, Way]) -> Iterator[dict[int, int]]:
             yield from ({axes[0]: first, axes[1]: second} for second in choices[1])
 
 
-def _part(way: Way, speed: int, skill: Skill) -> Part:
-    """An axis on its own: short of the goal where a late end would push against the stop behind it."""
-    short = min(abs(way.distance), feared(way, speed, abs(way.distance), skill))
+def _part(outlook: Outlook, axis: int, speed: int, left: int) -> Part:
+    """An axis on its own: short of the goal where a late end would do harm."""
+    way = outlook.ways[axis]
+    short = outlook.short(axis, speed, abs(way.distance), left)
     return Part(speed, held_for(way.pace, speed, abs(way.distance) - short), -short, short > way.near)
 
 
-def _legs(ways: dict[int, Way], speeds: dict[int, int], skill: Skill) -> Iterator[Leg]:
-    parts = {axis: _part(way, speeds[axis], skill) for axis, way in ways.items()}
+def _legs(outlook: Outlook, speeds: dict[int, int], left: int) -> Iterator[Leg]:
+    ways, skill = outlook.ways, outlook.skill
+    parts = {axis: _part(outlook, axis, speeds[axis], left) for axis in ways}
     soonest = skill.timing.usual
     if len(parts) == 1 or not skill.diagonals:
         axis, part = next(iter(parts.items()))
@@ -113,7 +113,7 @@ def _judged(leg: Leg, outlook: Outlook, left: int, runs: dict[int, int]) -> Leg:
     ways, skill, chances, misses = outlook.ways, outlook.skill, [], {}
     for axis, part in leg.parts.items():
         way = ways[axis]
-        spread = spread_of(way.pace, part.speed, part.held, skill)
+        spread = outlook.spread(axis, part.speed, part.held, left)
         beyond = part.off + way.pace.rate(part.speed) * skill.timing.tail - way.room
         if beyond > (CRAWL_DEG if part.speed == 1 else 0.0):
             return replace(leg, cost=DANGER + beyond)  # a late end may push against a stop

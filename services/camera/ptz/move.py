@@ -11,18 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import cast
 
 from services.camera.plan import Plan, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.driving import Driving
 from services.camera.ptz.goal import Goal, Limits, Pose
-from services.camera.ptz.helm import Helm
+from services.camera.ptz.helm import PROMISED, Helm
 from services.camera.ptz.hopping import Hopping
+from services.camera.ptz.outlook import LEG
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.turning import Turning
 from services.camera.ptz.zooming import Zooming
-from services.camera.requests import Reading
+from services.camera.requests import Reading, Status
 from services.errors import DeviceError
 
 MOST_LEGS = 30  # the deadline ends most moves that do not come to an end
@@ -79,6 +81,10 @@ class Move:
         reading, now = yield from self._begin(near)
         for _ in range(MOST_LEGS):
             out = self._out(reading)
+            while self._just_beside(reading, out):
+                reply = yield from self.helm.send(Status())
+                reading, now = cast(Reading, reply.result), reply.received
+                out = self._out(reading)
             if not out and self.helm.zoom_ends is None:
                 return Arrival(reading, now, self.helm.goal.clamped, self.helm.rests)
             if now > self.until or self.stuck >= STUCK:
@@ -124,6 +130,16 @@ class Move:
         if self.helm.zoom_ends is None and abs(self.helm.goal.pose[ZOOM] - pose[ZOOM]) > self.helm.zoom_near:
             out.append(ZOOM)
         return out
+
+    def _just_beside(self, reading: Reading, out: list[int]) -> bool:
+        """Whether another look may tell that it is there, where there are too few commands for another leg.
+
+        No reading that dithers is farther off than `near` leaves room for, so one that is near tells it.
+        """
+        helm, off = self.helm, [abs(self.helm.goal.pose[axis] - self.helm.limits.pose(reading)[axis]) for axis in out]
+        few = PROMISED - LEG < helm.commands < PROMISED
+        still = bool(out) and ZOOM not in out and helm.zoom_ends is None
+        return helm.skill.dithers and few and still and max(off) <= helm.near + DITHER_DEG / 2
 
     def _notice(self, before: Pose, after: Pose, out: list[int]) -> None:
         """Counts legs without effect; zoom may turn without a change of its coarse reading."""

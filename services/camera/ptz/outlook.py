@@ -14,6 +14,9 @@ from services.camera.ptz.pace import HALF_CHANGE, STOP_LATE, Pace
 from services.camera.ptz.skill import Skill
 
 NOISE_DEG = 0.05  # of a reading, beside what is learnt
+DITHER_DEG = 0.1  # more where readings dither: of the one that tells the way, and of the one that tells the end
+EARLY = 0.5  # of what a late end would add: so much sooner a last leg ends
+LAST = 5  # commands: a leg with no more left is the last one
 CORRECTION_S = 2.0  # a correction takes about so many answers, since it often begins without a reading
 LONG = 4.0  # answers: a leg as long as that is read in, which leaves part of the rate in doubt
 READ_ON_THE_WAY = 0.1
@@ -54,10 +57,30 @@ class Outlook:
         paces = [way.pace for way in self.ways.values()]
         learnt = all(2 * sum(map(pace.known, pace.speeds)) >= len(pace.speeds) for pace in paces)
         self._thrifty = len(paces) > 1 and learnt  # one axis has commands enough, and what is not known is to be seen
+        self._dithers = self.skill.dithers and learnt
 
     def rung(self, left: int) -> float:
         """What the command costs that ends a leg early and goes on slower, seconds; `left` commands with it."""
         return RUNG_S if self._thrifty and left <= FEW else 0.0
+
+    def spread(self, axis: int, speed: int, held: float, left: int) -> float:
+        """How far from where it should a leg may end, or be read to; what dithers counts where it is the last one."""
+        dither = DITHER_DEG if self._dithers and left <= LEG else 0.0
+        return spread_of(self.ways[axis].pace, speed, held, self.skill) + dither
+
+    def short(self, axis: int, speed: int, distance: float, left: int) -> float:
+        """How far before the goal a leg has to end at the latest, for fear of a late end; no more than the distance.
+
+        That may push against a stop. Or it would be beside the goal after a last leg: that ends on the near side, as
+        far as its end is there all the same when it comes in time.
+        """
+        way = self.ways[axis]
+        short = feared(way, speed, distance, self.skill)
+        if left <= LAST and not self.skill.dithers:
+            rate = way.pace.rate(speed)
+            sure = way.near - self.spread(axis, speed, way.near / rate, left)
+            short = max(short, min(EARLY * rate * self.skill.timing.tail, sure))
+        return min(short, distance)
 
     def seconds(self, axis: int, distance: float, left: int) -> float:
         """From rest at a distance (positive) until it is read to be there; `left` commands until then."""
@@ -76,7 +99,7 @@ class Outlook:
 
     def _leg(self, axis: int, distance: float, speed: int, left: int) -> float:
         way = self.ways[axis]
-        short = feared(way, speed, distance, self.skill)
+        short = self.short(axis, speed, distance, left)
         if short >= distance and speed > 1:
             return NEVER_S
         held = max(self.skill.timing.usual, held_for(way.pace, speed, distance - short))
@@ -85,7 +108,7 @@ class Outlook:
         left -= looks
         if short > way.near:
             return held + self.rung(left) + self.seconds(axis, short, left - 1)
-        spread = spread_of(way.pace, speed, held, self.skill)
+        spread = self.spread(axis, speed, held, left)
         correction = CORRECTION_S * self.skill.timing.usual + self.seconds(axis, way.near + spread / 2, left - LEG)
         return held + (1 - chance(-short, spread, way.near)) * correction
 
