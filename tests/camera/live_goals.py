@@ -1,8 +1,8 @@
 """Random goals in real time: ordered over a real broker from `apartment run`, met by the simulated camera's HTTP.
 
-What a user would measure with a watch: from the order to `done`, with the service's own looks at the camera between
-its requests, and a picture that is watched meanwhile. Without the service, in virtual time: `goals.py`; there more
-goals are gone to, so that the first ones of a camera count for less.
+What a user would measure with a watch: from the order to `done`, with the service's own looks at the camera between its
+requests, and a picture that is watched meanwhile; from a cold start, and after `apartment calibrate ptz`. Without the
+service, in virtual time: `goals.py`; there more goals are gone to, so that a camera's first ones count for less.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from random import Random
 from statistics import median
@@ -34,6 +35,7 @@ FIRMWARES = ("ip3m-941w-2019", "ip4m-1051b-2019", "ip2m-841b-strict", "ip4m-1041
 GOALS = 20
 PAUSE_S = (0.3, 4.0)  # between two orders: people do not wait for the service's rhythm
 LIMIT_S = 90.0
+CALIBRATES_S = 400.0  # at most
 SUBSTREAM = "ExtraFormat"  # the one that the service hands on
 
 
@@ -45,6 +47,7 @@ class LiveRow:
     """
 
     firmware: str
+    calibrated: bool
     goals: int
     seconds: float
     ratio: float
@@ -57,17 +60,22 @@ class LiveRow:
 
 
 def rows(goals: int = GOALS, seed: int = 1) -> Iterator[LiveRow]:
-    """Each of FIRMWARES, from a cold start."""
-    for firmware in FIRMWARES:
+    """Each of FIRMWARES, from a cold start and calibrated."""
+    for firmware, calibrated in product(FIRMWARES, (False, True)):
         with tempfile.TemporaryDirectory() as folder:
-            yield _row(firmware, Path(folder), random_goals(goals, seed), seed)
+            yield row(firmware, Path(folder), random_goals(goals, seed), seed, calibrated=calibrated)
 
 
-def _row(firmware: str, folder: Path, goals: list[Goal], seed: int) -> LiveRow:
+def row(firmware: str, folder: Path, goals: list[Goal], seed: int, *, calibrated: bool) -> LiveRow:
+    """All goals on one firmware."""
     found: list[_Met] = []
     rng = Random(seed)
     with small_flat(folder, simulator={"profile": firmware}) as flat, flat.client("camera/ip1/#") as bus:
         door = flat.doors["ip1"]
+        if calibrated:
+            bus.order("ip1", "CalibratePtz", "True")
+            learnt = bus.payload("camera/ip1/order_result", lambda result: result.final, CALIBRATES_S)
+            assert learnt.state == "done", learnt
         with shown(bus), watched(flat, SUBSTREAM) as kept:
             for goal in goals:
                 bus.collect(rng.uniform(*PAUSE_S))
@@ -75,11 +83,12 @@ def _row(firmware: str, folder: Path, goals: list[Goal], seed: int) -> LiveRow:
         pushed = motors(door)["pushed_s"]
     return LiveRow(
         firmware=firmware,
+        calibrated=calibrated,
         goals=len(goals),
         seconds=median(one.seconds for one in found),
         ratio=median(one.seconds / one.least for one in found),
-        virtual=median(one.ratio for one in outcomes(PROFILES[firmware], goals, seed)),
-        bound=wanted(PROFILES[firmware]),
+        virtual=median(one.ratio for one in outcomes(PROFILES[firmware], goals, seed, calibrated=calibrated)),
+        bound=wanted(PROFILES[firmware], calibrated=calibrated),
         off=max(one.off for one in found),
         pushed=pushed["pan"] + pushed["tilt"],
         failed=sum(one.state != "done" for one in found),
@@ -146,5 +155,6 @@ def table(found: list[LiveRow]) -> Table:
     for row in found:
         ratios = f"{row.ratio:.2f}", f"{row.virtual:.2f}", f"<= {row.bound}"
         rest = f"{row.off:.2f} deg", f"{row.pushed:.1f} s", str(row.failed), f"{row.kept:.0%}"
-        shown.add_row(row.firmware, str(row.goals), f"{row.seconds:.1f}", *ratios, *rest)
+        name = f"{row.firmware}, calibrated" if row.calibrated else row.firmware
+        shown.add_row(name, str(row.goals), f"{row.seconds:.1f}", *ratios, *rest)
     return shown
