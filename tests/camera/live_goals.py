@@ -73,8 +73,7 @@ def row(firmware: str, folder: Path, goals: list[Goal], seed: int, *, calibrated
     with small_flat(folder, simulator={"profile": firmware}) as flat, flat.client("camera/ip1/#") as bus:
         door = flat.doors["ip1"]
         if calibrated:
-            bus.order("ip1", "CalibratePtz", "True")
-            learnt = bus.payload("camera/ip1/order_result", lambda result: result.final, CALIBRATES_S)
+            learnt = bus.order("ip1", "CalibratePtz", "True", timeout_s=CALIBRATES_S)
             assert learnt.state == "done", learnt
         with shown(bus), watched(flat, SUBSTREAM) as kept:
             for goal in goals:
