@@ -63,11 +63,10 @@ def rows(goals: int = GOALS, seed: int = 1) -> Iterator[LiveRow]:
     """Each of FIRMWARES, from a cold start and calibrated."""
     for firmware, calibrated in product(FIRMWARES, (False, True)):
         with tempfile.TemporaryDirectory() as folder:
-            yield row(firmware, Path(folder), random_goals(goals, seed), seed, calibrated=calibrated)
+            yield _row(firmware, Path(folder), random_goals(goals, seed), seed, calibrated=calibrated)
 
 
-def row(firmware: str, folder: Path, goals: list[Goal], seed: int, *, calibrated: bool) -> LiveRow:
-    """All goals on one firmware."""
+def _row(firmware: str, folder: Path, goals: list[Goal], seed: int, *, calibrated: bool) -> LiveRow:
     found: list[_Met] = []
     rng = Random(seed)
     with small_flat(folder, simulator={"profile": firmware}) as flat, flat.client("camera/ip1/#") as bus:

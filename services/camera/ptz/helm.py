@@ -26,7 +26,7 @@ LATE_PART = 0.85  # of how late an answer may be, where a motion that it begins 
 SURPRISES = 0.2  # of what was known before is replaced by each rest
 DIRECTIONS = {direction.value: direction for direction in Direction}
 PROMISED = 12  # commands
-COMMANDS = 10  # a move should need no more: an answer may come late
+COMMANDS = PROMISED - 2  # a move should need no more: an answer may come late
 Levels = tuple[int, int, int]
 
 

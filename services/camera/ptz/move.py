@@ -20,7 +20,7 @@ from services.camera.ptz.goal import Goal, Limits, Pose
 from services.camera.ptz.helm import PROMISED, Helm
 from services.camera.ptz.hopping import Hopping
 from services.camera.ptz.outlook import LEG
-from services.camera.ptz.skill import Skill
+from services.camera.ptz.skill import DITHER_DEG, Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.turning import Turning
 from services.camera.ptz.zooming import Zooming
@@ -30,7 +30,6 @@ from services.errors import DeviceError
 MOST_LEGS = 30  # the deadline ends most moves that do not come to an end
 STUCK = 3  # legs without effect
 MOVED = 0.15  # degrees or levels
-DITHER_DEG = 0.2  # two readings of an axis at rest differ by so much at most
 
 
 @dataclass(frozen=True)
@@ -123,7 +122,7 @@ class Move:
 
         One that had arrived and was not turned since is not out because its reading dithers.
         """
-        pose, dither = self.helm.limits.pose(reading), DITHER_DEG if self.helm.skill.dithers else 0.0
+        pose, dither = self.helm.limits.pose(reading), 2 * DITHER_DEG if self.helm.skill.dithers else 0.0
         near = [self.helm.near + (0.0 if axis in self.helm.turned else dither) for axis in (PAN, TILT)]
         out = [axis for axis in (PAN, TILT) if abs(self.helm.goal.pose[axis] - pose[axis]) > near[axis]]
         self.helm.turned = set(out)
@@ -139,7 +138,7 @@ class Move:
         helm, off = self.helm, [abs(self.helm.goal.pose[axis] - self.helm.limits.pose(reading)[axis]) for axis in out]
         few = PROMISED - LEG < helm.commands < PROMISED
         still = bool(out) and ZOOM not in out and helm.zoom_ends is None
-        return helm.skill.dithers and few and still and max(off) <= helm.near + DITHER_DEG / 2
+        return helm.skill.dithers and few and still and max(off) <= helm.near + DITHER_DEG
 
     def _notice(self, before: Pose, after: Pose, out: list[int]) -> None:
         """Counts legs without effect; zoom may turn without a change of its coarse reading."""

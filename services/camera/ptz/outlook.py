@@ -11,10 +11,9 @@ from dataclasses import dataclass, field
 from math import exp, inf, log, sqrt
 
 from services.camera.ptz.pace import HALF_CHANGE, STOP_LATE, Pace
-from services.camera.ptz.skill import Skill
+from services.camera.ptz.skill import DITHER_DEG, Skill
 
 NOISE_DEG = 0.05  # of a reading, beside what is learnt
-DITHER_DEG = 0.1  # more where readings dither: of the one that tells the way, and of the one that tells the end
 EARLY = 0.5  # of what a late end would add: so much sooner a last leg ends
 LAST = 5  # commands: a leg with no more left is the last one
 CORRECTION_S = 2.0  # a correction takes about so many answers, since it often begins without a reading

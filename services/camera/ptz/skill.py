@@ -23,6 +23,7 @@ TAIL_PART = 3.3  # of the usual time, where that is long
 FORGETS, WORSE = 0.998, 1.2  # of the latest answer: kept with each one more; and it may be later the next time
 SOONER_S, LATER_S, MOST_LATE_S = 0.008, 0.04, 0.5
 NEAR_DEG, NEARER_DEG = 0.42, 0.35  # a reading so near has arrived: 0.5 promised, resolution and dither taken off
+DITHER_DEG = 0.1  # a reading at rest may be so far off where they dither
 STILL_DEG = 0.05
 STEADY = 6  # readings at rest that were alike show that they do not dither
 LEVEL = 1.0  # zoom is read in coarse steps: a reading may be so far from the truth
