@@ -23,6 +23,7 @@ from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import Arrival, goto
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Reading, Reply, Request, Status
+from services.camera.web.gate import Gate
 from services.errors import DeviceError
 from services.simulators.camera.device import Device
 from services.simulators.camera.digest import Door, realm
@@ -97,7 +98,8 @@ class Rig:
         door = Door(realm(self.profile, self.camera.serial), "ros", "secret123", self.profile, rng)
         self.wire = Counted(Inside(self.device, door, cast(Any, None)))
         address = Address("http://192.0.2.9", "ros", SecretStr("secret123"))
-        self.client = Amcrest(address, self.wire)
+        gate = Gate(clock=lambda: self.wire.now, pause=self._pause)
+        self.client = Amcrest(address, self.wire, gate)
         self.skill.forget_senses(flip=True, mirror=True)
         told = cast(Capabilities, self._send(GetCapabilities("motors"), 0).result)  # as the service asks at first
         self.skill.believe(absolute=told.absolute, relative=told.relative)
@@ -158,6 +160,10 @@ class Rig:
                 self.now = max(self.now, stage.due)
                 stage.tick(self.now)
         return run
+
+    def _pause(self, seconds: float) -> None:
+        """What the client waits after an odd refusal counts like the camera's own time."""
+        self.wire.now += seconds
 
     def _send(self, request: Request, ticket: int) -> Reply:
         sent = self.wire.now = self.now
