@@ -28,7 +28,7 @@ LEFT_DEG = (1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, when the look is of: th
 LEFT_LEVELS = 0.3  # of zoom's way, at most, where it is told in coarse steps
 EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
 EXPECTED_NOISE_DEG = 0.18  # and whose own noise is no more
-LATER = 0.1  # of the spread of answers: a look is so much later, so that a quick one is not before its time
+LATER = 0.4  # of the spread of answers: a look is so much later, so that a quick one is not before its time
 
 # What is known without a look, and how exact one is; standard deviations.
 LEAST_DEG = 0.05  # of where hops lead
