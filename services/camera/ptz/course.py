@@ -29,6 +29,7 @@ class Course:
         self.told: tuple[list[Told], ...] = ([], [], [])
         self.shift = [0.0, 0.0, 0.0]  # what readings say beyond the model
         self.levels = [0, 0, 0]
+        self.read_at = 0.0  # when the latest reading came
 
     def tell(self, reply: Reply, levels: tuple[int, int, int]) -> None:
         """A command was answered: from then on it turns like this."""
@@ -57,6 +58,11 @@ class Course:
             when = max(now, when + (goal - self.stopped(axis, when)) / rate)
         return when
 
+    def unseen(self, now: float) -> float:
+        """Since when an axis turns without a reading that shows it; now, where none does."""
+        begun = [told[0].at for told, level in zip(self.told, self.levels, strict=True) if level]
+        return max(self.read_at, min(begun, default=now))
+
     def rests_at(self) -> float:
         """When the axes that were ended stand; those that turn are not asked."""
         ends = [0.0]
@@ -76,6 +82,7 @@ class Course:
 
     def read(self, reply: Reply, reading: Reading) -> None:
         """Takes in a reading."""
+        self.read_at = reply.received
         late = reply.received - reply.sent - self.skill.timing.usual
         pose = self.limits.pose(reading)
         for axis in (PAN, TILT, ZOOM):

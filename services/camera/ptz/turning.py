@@ -35,6 +35,7 @@ MOVED_DEG = 0.3
 PROBE_LOOKS = 3
 LOOKS = 1  # readings in a leg
 MOST_LOOKS = 15
+RISK = 3.0  # doubts of where it ends: with less room an axis may be at its stop
 LOOK_PART = 1.0  # of what a late end makes of a leg: doubt below that needs no look
 
 
@@ -182,6 +183,13 @@ class Turning:
         stop = high - before if self.helm.course.levels[axis] > 0 else low + before
         return self.helm.course.end_for(axis, stop, now)
 
+    def _looks_until(self, leg: Leg, left: dict[int, int], now: float) -> float:
+        """Until when a look may be asked for: later, a late answer to it and then to an end lets an axis push."""
+        turning, timing = [axis for axis in (PAN, TILT) if self.helm.course.levels[axis]], self.helm.skill.timing
+        ends = min(self._safe(axis, self._rate(axis), now) for axis in turning)
+        others = 0 if leg.joint else len(left) - 1  # are ended before it
+        return ends - (2 + others) * timing.usual - timing.tail
+
     def _along(self, left: dict[int, int]) -> list[int]:
         """The axes that turn without being led to an end."""
         return [axis for axis in (PAN, TILT) if self.helm.course.levels[axis] and axis not in left]
@@ -195,7 +203,7 @@ class Turning:
             level, (low, high) = self.helm.course.levels[axis], self.helm.limits.ranges[axis]
             at = self.helm.course.stopped(axis, ends)
             room = high - at if level > 0 else at - low
-            if level and room < 2 * self.helm.course.doubt(axis, ends):
+            if level and room < RISK * self.helm.course.doubt(axis, ends):
                 return True
         return False
 
@@ -211,16 +219,17 @@ class Turning:
             else:
                 send = min(ends.values()) - usual
             send = min([send, *(self._safe(axis, self._rate(axis), now) - usual for axis in self._along(left))])
-            risky, soon = self._risky(send + usual), send - now <= BLIND_S
+            blind, until = self.helm.course.unseen(now) + BLIND_S, self._looks_until(leg, left, now)
+            risky, soon = self._risky(send + usual), send <= blind
             sure = not risky and all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)
-            if send - now < usual + spread or (look >= LOOKS and soon and not risky):
+            if send - now < usual + spread or (not risky and (until < now or (look >= LOOKS and soon))):
                 break
             enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else self.helm.near
             small = {axis: max(LOOK_PART * spread * rate, enough) for axis, rate in rates.items()}
             certain = all(self.helm.course.doubt(axis, ends[axis]) < small[axis] for axis in left)
             if certain and soon:
                 break
-            latest = min(now + BLIND_S, send - usual - spread)
+            latest = min(blind, send - usual - spread, until)
             now = yield from wait(latest if sure else min(latest, now + max(0.3, 0.5 * (latest - now))))
             reply = yield from self.helm.send(Status())
             now = reply.received
