@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import hypot
 from typing import cast
 
 from services.camera.device import same
 from services.camera.plan import Plan, ask, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM, Course
 from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
-from services.camera.ptz.pace import HALF_CHANGE, READ_LATE, READ_PART
+from services.camera.ptz.pace import ACT_PART, HALF_CHANGE, READ_LATE, READ_PART, STOP_LATE
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import stop as until_confirmed
 from services.camera.requests import Direction, Reading, Reply, Request, Start, Status
@@ -23,6 +25,9 @@ UNSURE_LEVELS = 0.1  # it is not said to stand at the very end, which it may jus
 FOREVER = 1e12
 WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
 LATE_PART = 0.85  # of how late an answer may be, where a motion that it begins is ended only after it
+LAST_DEG, LAST_DOUBT = 0.5, 0.5  # the last bit of way, of which a reading tells the rest; a share of it is doubted
+RESTS_S = 0.02  # after it is reckoned to rest, where the camera does not tell it
+SLACK = 2.0  # such doubts of the moment that a reading tells of
 SURPRISES = 0.2  # of what was known before is replaced by each rest
 DIRECTIONS = {direction.value: direction for direction in Direction}
 PROMISED = 12  # commands
@@ -42,6 +47,7 @@ class Helm:
         self.turned: set[int] = {PAN, TILT}  # since it was last judged where they rest
         self.zoom_ends: float | None = None
         self.quiet = 0.0  # until then the firmware drives by itself
+        self.foretold = False  # whether where it stands was
         self.rests = 0.0  # when it came to rest, as is reckoned
         self.course = Course(limits, skill, self.aim)
 
@@ -108,25 +114,53 @@ class Helm:
             settled = self._settled()
         now = yield from wait(max(now, settled))
         self.rests = max(self.quiet, self.course.rests_at())
-        reply = yield from self.send(Status())
-        reading = cast(Reading, reply.result)
-        self._weigh(reading)
-        self._see_still(reading)
-        self.course.read(reply, reading)
-        while self.zoom_ends is None and (
-            pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading) or self._moves(reading)
+        reply, seen, reading = yield from self._look()
+        while reading is None or (
+            self.zoom_ends is None and (pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading))
         ):
             yield from wait(reply.sent + PAIR_S)
-            again = yield from self.send(Status())
-            before, reading, reply = reading, cast(Reading, again.result), again
-            if same(before, reading):
-                self.skill.always_moving = reading.moving is True
+            before = seen
+            reply, seen, reading = yield from self._look()
+            if same(before, seen) and self.zoom_ends is None:
+                self.skill.always_moving = seen.moving is True
+                reading = seen
                 break
+        self.foretold = reading is not seen
+        rests = 0.0 if seen.moving is False else self.rests + self._unsure(0.0) + RESTS_S
         if self.zoom_ends is not None:
             self.time_zoom(reply.received)
         self._place_zoom(reading)
         self.stand(reading)
-        return reading, reply.received
+        return reading, (yield from wait(max(reply.received, rests)))
+
+    def _look(self) -> Plan[tuple[Reply, Reading, Reading | None]]:
+        """A look where it should rest: the answer, its reading, and that of the rest; None: not known by this one."""
+        reply = yield from self.send(Status())
+        seen = cast(Reading, reply.result)
+        rest = self._resting(reply, seen)
+        self._weigh(rest or seen)
+        self._see_still(rest or seen)
+        self.course.read(reply, seen)
+        return reply, seen, rest
+
+    def _resting(self, reply: Reply, seen: Reading) -> Reading | None:
+        """The reading of the rest that follows from one of the last bit of way, or is one; None: it may be neither."""
+        pace, late = self.skill.paces[PAN], reply.received - reply.sent - self.skill.timing.usual
+        when, moves = pace.seen_at(reply.sent, late), self._moves(seen) and self.zoom_ends is None
+        slack = self._unsure(late)
+        if seen.moving is False or self.quiet or any(self.course.levels[:2]) or when > self.course.rests_at() + slack:
+            return None if moves else seen
+        pose, left = self.limits.pose(seen), [0.0, 0.0]
+        for axis in (PAN, TILT):
+            if self.course.told[axis]:
+                at = self.course.at(axis, when)
+                left[axis] = self.course.stopped(axis, FOREVER) - at
+                doubt = LAST_DOUBT * abs(left[axis]) + abs(at - self.course.at(axis, when - slack))
+                off = abs(self.goal.pose[axis] - pose[axis] - left[axis])
+                if abs(left[axis]) > LAST_DEG or off <= self.near < off + doubt:
+                    return None
+        there = round((seen.pan + left[PAN]) % 360.0, 2), round(seen.tilt + left[TILT], 2)
+        return replace(seen, pan=there[PAN], tilt=there[TILT], moving=None)
 
     def _weigh(self, reading: Reading) -> None:
         """How well the place of rest was reckoned, in seconds of the fastest motion before it."""
@@ -141,20 +175,20 @@ class Helm:
         """An axis that was not turned shows how well readings repeat."""
         pose = self.limits.pose(reading)
         for axis in (PAN, TILT):
-            if not self.course.told[axis] and not self.quiet:
+            if not self.course.told[axis] and not self.quiet and not self.foretold:
                 self.skill.see_still(pose[axis] - self.course.origin[axis])
 
     def reckoned(self, axis: int) -> float:
         """How far off the reckoned place of rest of an axis may be, degrees."""
         return 2 * self.skill.surprise * self._fastest(axis)
 
-    def fastest(self, axis: int, left: float) -> float:
+    def fastest(self, axis: int, left: float, again: float = 0.0) -> float:
         """The rate with which an axis that turns may go on, so many degrees before its stop.
 
-        The answer to that may come late, and only then it can be ended.
+        The answer to that may come late, and only then it can be ended; `again`: and that, by such a part of it.
         """
         timing, rate = self.skill.timing, self.skill.paces[axis].rate(abs(self.course.levels[axis]))
-        return (left - LATE_PART * timing.tail * rate) / timing.usual
+        return (left - LATE_PART * timing.tail * rate) / (timing.usual + again * timing.tail)
 
     def _fastest(self, axis: int) -> float:
         """The highest speed that an axis was told since it last stood."""
@@ -174,11 +208,23 @@ class Helm:
         """Whether the camera says that it moves; some firmware says so for ever."""
         return reading.moving is True and not self.skill.always_moving
 
+    def _unsure(self, late: float) -> float:
+        """How far off it may be when it rests, over the moment that a look so late tells of, seconds."""
+        ended = max((told[-1].late for told in self.course.told[:ZOOM] if told), key=abs, default=0.0)
+        parts = (READ_LATE, 1.0), (READ_PART, late), (ACT_PART, ended), (STOP_LATE, 1.0)
+        doubts = (self.skill.paces[PAN].other_doubt(which) * part for which, part in parts)
+        return SLACK * hypot(*doubts, self._slows())
+
+    def _slows(self) -> float:
+        """How much longer it may take to slow down than is reckoned, seconds."""
+        return max(self.skill.paces[axis].other_doubt(HALF_CHANGE) * self._fastest(axis) for axis in (PAN, TILT))
+
     def _settled(self) -> float:
         """When a reading has to be asked for that shows everything at rest."""
         pace = self.skill.paces[PAN]
-        doubt = 2 * pace.other_doubt(READ_LATE) + pace.other(READ_PART) * self.skill.timing.spread
-        doubt += max(self.skill.paces[axis].other_doubt(HALF_CHANGE) * self._fastest(axis) for axis in (PAN, TILT))
+        doubt = pace.other_doubt(READ_LATE) + self._slows()
+        if self.quiet:  # otherwise what is seen on its last bit of way tells the rest, too
+            doubt += pace.other_doubt(READ_LATE) + pace.other(READ_PART) * self.skill.timing.spread
         return max(self.quiet, self.course.rests_at()) - self.skill.read_late + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:

@@ -21,6 +21,7 @@ RUNGS = 4  # legs of tilt, one after the other
 ALONG = 1.0
 SHORT = 0.5
 FEW = 5  # commands; with as many left it is ended
+AGAIN, FEAR = 0.2, 1.1  # two late answers, one after the other: one leg ends sooner, and the next is slower
 LIKELY = 0.5  # a leg that ends so probably at the goal is the last one
 
 Watch = Callable[[Leg, dict[int, int], float], Plan[float]]
@@ -73,9 +74,9 @@ class Homing:
         room = high - helm.aim[axis] if distance > 0 else helm.aim[axis] - low
         fastest = inf
         if helm.course.levels[axis] * distance > 0:  # it turns on until a start takes effect
-            fastest = helm.fastest(axis, abs(distance) + room)
+            fastest = helm.fastest(axis, abs(distance) + room, AGAIN)
             room -= helm.skill.paces[axis].rate(abs(helm.course.levels[axis])) * helm.skill.timing.spread
-        return Way(distance, room, helm.skill.paces[axis], helm.near, fastest)
+        return Way(distance, room, helm.skill.paces[axis], helm.near, fastest, FEAR)
 
     def _leg(self, way: Way) -> Leg:
         """A leg that will hardly end at the goal ends before it for sure: a slower one goes on from there."""

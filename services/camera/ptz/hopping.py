@@ -19,7 +19,7 @@ from services.camera.ptz.course import PAN, TILT, ZOOM, ZOOM_SLOWS_S
 from services.camera.ptz.driving import at_rest
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
-from services.camera.ptz.helm import Helm
+from services.camera.ptz.helm import RESTS_S, Helm
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE
 from services.camera.ptz.planes import Planes, Scale
 from services.camera.ptz.rush import rush
@@ -40,7 +40,6 @@ TRY_DEG = 12.0  # a first hop, whose scale is a guess
 SHORT, KNOWN = 0.5, 0.4  # spreads: a hop in flight ends before its goal, where no more of the doubt is left
 FLIES_DEG_S = 8.0  # of a hop that took the place of another one: from where is not known well enough then
 LATEST = 1.25  # spreads: when a hop acted that was answered later is not known well enough to foretell where it leads
-RESTS_S = 0.02  # after it is reckoned to rest, where that was foretold
 FEW = 2  # commands, for a hop from rest and a look
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
-from services.camera.ptz.pace import PAN_RATES, TILT_RATES, Pace
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.zooming import widest
 from tests.camera.motors import Motors, drive
@@ -13,8 +12,7 @@ LIMITS = Limits()
 
 
 def test_after_zooming_out_it_is_brought_to_the_very_end_where_that_matters() -> None:
-    motors = Motors(zoom=6.0, acceleration=90.0, jitter=0.02)  # answers as even as that, and a known rate: it stays off
-    skill = Skill(paces=(Pace(PAN_RATES), Pace(TILT_RATES), Pace((motors.zoom_rate,))))
+    motors, skill = Motors(zoom=6.0, acceleration=90.0, jitter=0.02), Skill()  # answers as even as that: it stays off
     run, took = drive(goto(LIMITS.goal(95.0, 25.0, 0.0), LIMITS, skill, 1060.0), motors)
     assert run.error is None
     assert motors.pose[2] > 0.0

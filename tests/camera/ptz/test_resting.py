@@ -1,0 +1,38 @@
+"""Where pan and tilt come to rest after a stop, told by a look on the last bit of their way."""
+
+from __future__ import annotations
+
+import pytest
+
+from services.simulators.camera.firmwares import PROFILES
+from tests import bounds
+from tests.camera.goals import LIMITS, Rig, random_goals
+
+NAMES = ("ip3m-941w-2019", "ip4m-1051b-2019", "ip3m-943b")  # the second says for ever that it moves; the last dithers
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_look_on_the_last_bit_of_way_tells_where_it_will_rest(name: str, seed: int) -> None:
+    rig, told = Rig(PROFILES[name], seed), []
+    rig.calibrate()
+    for goal in random_goals(bounds.GOALS, seed):
+        outcome = rig.go(goal)
+        assert outcome.rests
+        reading, truth = rig.near, rig.truth()
+        if reading is not None and reading.moving is None:
+            pan, tilt, _ = LIMITS.pose(reading)
+            told.append(max(abs(pan - LIMITS.unwrap(truth[0])), abs(tilt - truth[1])))
+        rig.now += 1.0
+    assert len(told) > 5
+    assert max(told) < (0.25 if rig.profile.status_dither else 0.2)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_that_a_rest_was_foretold_a_little_wrong_is_not_taken_for_dither(name: str) -> None:
+    rig = Rig(PROFILES[name], 4)
+    rig.calibrate()
+    for goal in random_goals(bounds.GOALS, 4):
+        rig.go(goal)
+        rig.now += 1.0
+    assert rig.skill.dithers == rig.profile.status_dither
