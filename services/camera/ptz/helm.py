@@ -224,7 +224,7 @@ class Helm:
         pace = self.skill.paces[PAN]
         doubt = pace.other_doubt(READ_LATE) + self._slows()
         if self.quiet:  # otherwise what is seen on its last bit of way tells the rest, too
-            doubt += pace.other_doubt(READ_LATE) + pace.other(READ_PART) * self.skill.timing.spread
+            doubt += pace.other(READ_PART) * self.skill.timing.spread / 2  # one that comes too soon says that it moves
         return max(self.quiet, self.course.rests_at()) - self.skill.read_late + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:
