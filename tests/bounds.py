@@ -8,7 +8,6 @@ MEDIAN_START_STOP = 2.0  # time over the least time of the motors, where the cam
 MEDIAN_POSITIONS = 1.3  # where it honours an absolute position, or the goal is a place that has a preset
 MEDIAN_RELATIVE = 1.42  # not 1.3 where only one within the picture is; `make bench` prints the least to be expected
 MEDIAN_RELATIVE_CALIBRATED = 1.32  # of thousands it is 1.29 to 1.31
-MEDIAN_PAN_ONLY = 2.05  # not 2.0 where a position is honoured but for its tilt, unless calibrated: answers take longer
 MEDIAN_BESIDE = 2.0  # of start and stop from a preset that is up to PRESET_DEG beside the goal
 PRESET_DEG = 2.0
 COMMANDS = 12  # for a goal, answers to login challenges not counted

@@ -182,13 +182,13 @@ class Helm:
         """How far off the reckoned place of rest of an axis may be, degrees."""
         return 2 * self.skill.surprise * self._fastest(axis)
 
-    def fastest(self, axis: int, left: float, again: float = 0.0) -> float:
+    def fastest(self, axis: int, left: float) -> float:
         """The rate with which an axis that turns may go on, so many degrees before its stop.
 
-        The answer to that may come late, and only then it can be ended; `again`: and that, by such a part of it.
+        The answer to that may come late, and only then it can be ended.
         """
         timing, rate = self.skill.timing, self.skill.paces[axis].rate(abs(self.course.levels[axis]))
-        return (left - LATE_PART * timing.tail * rate) / (timing.usual + again * timing.tail)
+        return (left - LATE_PART * timing.tail * rate) / timing.usual
 
     def _fastest(self, axis: int) -> float:
         """The highest speed that an axis was told since it last stood."""

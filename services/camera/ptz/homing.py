@@ -8,21 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import inf
 
 from services.camera.plan import Plan
 from services.camera.ptz import drive as own
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.helm import Helm, levels_of, sign
-from services.camera.ptz.leg import Leg, choose
-from services.camera.ptz.outlook import Way, spread_of
+from services.camera.ptz.ladder import Ladder
+from services.camera.ptz.leg import Leg, Part
+from services.camera.ptz.outlook import Way
 
-RUNGS = 4  # legs of tilt, one after the other
 ALONG = 1.0
-SHORT = 0.5
-FEW = 5  # commands; with as many left it is ended
-AGAIN, FEAR = 0.2, 1.1  # two late answers, one after the other: one leg ends sooner, and the next is slower
-LIKELY = 0.5  # a leg that ends so probably at the goal is the last one
+BACK_DEG = 10.0  # it goes no farther behind its goal
+LOOK = 1  # command, at the end
 
 Watch = Callable[[Leg, dict[int, int], float], Plan[float]]
 
@@ -35,20 +32,33 @@ class Homing:
 
     def tilt(self, now: float) -> Plan[float]:
         """Leads tilt to its goal, and pan along; returns when the position was answered that ends both."""
-        helm = self.helm
-        for _ in range(RUNGS):
-            way = self._way(TILT, now)
-            if helm.course.told[TILT] and abs(way.distance) <= helm.near:
-                break
-            leg = self._leg(way)
-            turning = {TILT: leg.parts[TILT].speed * (sign(way.distance) or 1), PAN: self._along(leg.held, now)}
+        helm, speed = self.helm, 0
+        if abs(self._way(TILT, now).distance) > helm.near or not helm.course.told[TILT]:
+            ladder, side, speed = self._set_out(now)
+        while speed:
+            leg = self._leg(ladder, speed, self._left(side, now), helm.left - LOOK - 1)
+            turning = {TILT: speed * side, PAN: self._along(leg.held, now)}
             turning = {axis: level for axis, level in turning.items() if level}
             if levels_of(turning) != tuple(helm.course.levels):
                 now = (yield from helm.start(levels_of(turning))).received
+            leg = self._leg(ladder, speed, self._left(side, now), helm.left - LOOK)
             now = yield from self.watch(leg, {TILT: turning[TILT]}, now)
-            if helm.left < FEW or (leg.chance >= LIKELY and self._meets(now)):
-                break
+            if not ladder.covers(self._left(side, now)):
+                ladder, side, speed = self._set_out(now)
+                continue
+            speed = ladder.next(self._left(side, now), speed, helm.left - LOOK)
+            if speed < 0:
+                ladder, side, speed = ladder.back, -side, -speed
         return (yield from self.home(now))
+
+    def _set_out(self, now: float) -> tuple[Ladder, int, int]:
+        """From rest, or from where nothing is reckoned for: the way to the goal, its side, and the first speed."""
+        way = self._way(TILT, now)
+        low, high = self.helm.limits.ranges[TILT]
+        side = sign(way.distance) or 1
+        back = replace(way, distance=-BACK_DEG * side, room=high - low - way.room)
+        ladder = Ladder(way, self.helm.skill, Ladder(back, self.helm.skill))
+        return ladder, side, ladder.begins(abs(way.distance), self.helm.left - LOOK)
 
     def home(self, now: float) -> Plan[float]:
         """Pan and zoom are driven to their goal; tilt ends."""
@@ -62,32 +72,22 @@ class Homing:
         helm.quiet = now + own.longest(helm.skill, here, way.to)
         return now
 
-    def _meets(self, now: float) -> bool:
-        """Whether tilt will rest at its goal when it is ended now; after a late answer it may be beyond."""
-        ends = now + self.helm.skill.timing.usual
-        return abs(self.helm.aim[TILT] - self.helm.course.stopped(TILT, ends)) <= self.helm.near
-
     def _way(self, axis: int, now: float) -> Way:
         helm = self.helm
         distance = helm.aim[axis] - helm.course.stopped(axis, now + helm.skill.timing.usual)
         low, high = helm.limits.ranges[axis]
         room = high - helm.aim[axis] if distance > 0 else helm.aim[axis] - low
-        fastest = inf
-        if helm.course.levels[axis] * distance > 0:  # it turns on until a start takes effect
-            fastest = helm.fastest(axis, abs(distance) + room, AGAIN)
-            room -= helm.skill.paces[axis].rate(abs(helm.course.levels[axis])) * helm.skill.timing.spread
-        return Way(distance, room, helm.skill.paces[axis], helm.near, fastest, FEAR)
+        return Way(distance, room, helm.skill.paces[axis], helm.near)
 
-    def _leg(self, way: Way) -> Leg:
-        """A leg that will hardly end at the goal ends before it for sure: a slower one goes on from there."""
-        helm = self.helm
-        leg = choose({TILT: way}, helm.skill, left=helm.left)
-        part = leg.parts[TILT]
-        if leg.chance >= LIKELY or part.feared:
-            return leg
-        spread = min(abs(way.distance) / 2, SHORT * spread_of(way.pace, part.speed, part.held, helm.skill))
-        held = max(helm.skill.timing.usual, part.held - spread / way.pace.rate(part.speed))
-        return replace(leg, parts={TILT: replace(part, held=held, off=part.off - spread)})
+    def _left(self, side: int, now: float) -> float:
+        """How far tilt would rest before its goal if it were ended now; below 0: behind it."""
+        return side * (self.helm.aim[TILT] - self.helm.course.stopped(TILT, now + self.helm.skill.timing.usual))
+
+    def _leg(self, ladder: Ladder, speed: int, distance: float, left: int) -> Leg:
+        """With a speed from a distance until the next command should act."""
+        usual, rate = self.helm.skill.timing.usual, self.helm.skill.paces[TILT].rate(speed)
+        before = ladder.acts_at(distance, speed, left)
+        return Leg({TILT: Part(speed, max(usual, (distance - before) / rate), -before)})
 
     def _along(self, held: float, now: float) -> int:
         """The level of pan meanwhile: so fast that it stays before its goal, and before the stop behind it if late."""

@@ -35,7 +35,6 @@ class Way:
     """What one axis has before it: the distance with its sign, and how much room there is behind its end.
 
     `near`: so far from its goal it has arrived. `fastest`: it may begin with no higher rate, but for the lowest.
-    `fear`: so many times what a late end adds is left before a stop.
     """
 
     distance: float
@@ -43,7 +42,6 @@ class Way:
     pace: Pace
     near: float
     fastest: float = inf
-    fear: float = 1.0
 
 
 @dataclass
@@ -122,7 +120,7 @@ def looks_in(held: float, *, known: bool) -> int:
 def feared(way: Way, speed: int, distance: float, skill: Skill) -> float:
     """How far before the goal a leg has to end, since a late end would push against the stop behind it."""
     held = held_for(way.pace, speed, distance)
-    fear = way.fear * way.pace.rate(speed) * skill.timing.tail + 2 * doubt(way.pace, speed, held, skill)
+    fear = way.pace.rate(speed) * skill.timing.tail + 2 * doubt(way.pace, speed, held, skill)
     short = max(0.0, fear - way.room)
     return min(short, CRAWL_DEG) if speed == 1 else short
 

@@ -1,0 +1,168 @@
+"""One axis on its way down to a goal, from a fast speed to slower ones in flight: which one is next, and from where.
+
+A start that takes the place of a running motion acts as late as its answer, which is known then and not before. So a
+fast speed leads somewhere near, a slower one takes over, and one that is slow enough is ended. What is best is
+reckoned back from the end (dynamic programming): the value of a state is the time that it will probably take from
+there, that of each state with one command more left follows from those that the command leads to. A command that may
+come so late that the axis would be at its stop is none. Pure; what is done with it is `homing.py`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.camera.ptz.outlook import LEG, LONG, NOISE_DEG, OVER_S, READ_ON_THE_WAY, Way
+from services.camera.ptz.skill import Skill
+
+STEP_DEG = 0.1  # of the distances that are reckoned with
+BEYOND_DEG = 12.0  # as far behind the goal
+FARTHER_DEG = 10.0  # before it, more than it takes to be as fast as ever
+MOST = 6  # commands: with more left nothing changes
+TURNS = 5  # of the slowest speeds may turn it back
+MISSING = 3  # commands that may be missing
+PRICE_S = 0.08  # of a command, while there are enough
+MISS = 3.0  # answers: a miss is put right from rest, and so much later
+DOUBTED, FEARED = 0.5, 2.0  # of the doubt about a rate: what counts usually, and where a stop is near
+LATE_PART = 0.85  # of how late an answer may be, before a slower speed that may be late, too
+AGAIN, FEAR = 0.35, 1.1  # parts of it: the second answer in a row that is late; and the one that is an end
+NEVER_S = 60.0
+
+Values = NDArray[np.float64]
+
+
+class Ladder:
+    """What one axis will take. Distances are degrees before the goal, of where it would rest; below 0: behind it.
+
+    `back` is the way back for what has gone too far; without it, there is as much room.
+    """
+
+    def __init__(self, way: Way, skill: Skill, back: Ladder | None = None) -> None:
+        self.back, self._near, self._timing = back or self, way.near, skill.timing
+        self._rates = np.array([way.pace.rate(speed) for speed in way.pace.speeds])
+        self._slows = np.array([[way.pace.change(one, to) for to in way.pace.speeds] for one in way.pace.speeds])
+        self._stops = np.array([way.pace.change(speed) for speed in way.pace.speeds])
+        farthest = self._rates[-1] * (FEAR * skill.timing.tail + skill.timing.usual) + FARTHER_DEG
+        self._at = np.arange(-BEYOND_DEG, min(farthest, abs(way.distance) + BEYOND_DEG / 2), STEP_DEG)
+        self._behind = slice(0, int(np.count_nonzero(self._at < 0)))
+        doubts = np.array([way.pace.doubt(speed) for speed in way.pace.speeds])
+        read = np.minimum(doubts, READ_ON_THE_WAY * self._rates)
+        self._spreads = self._rates * skill.timing.spread + DOUBTED * LONG * skill.timing.usual * read + NOISE_DEG
+        self._ends, self._goes_on = self._allowed(way.room, FEARED * LONG * skill.timing.usual * doubts)
+        self._options: list[list[Values]] = []  # by commands left, and speed: [0: end it, or a speed below it; place]
+        self._best: list[Values] = []  # by commands left: [speed; place], less the time to come there
+        for left in range(-MISSING, MOST + 1):
+            self._reckon(left)
+
+    def begins(self, distance: float, left: int) -> int:
+        """The speed from rest; `left` commands for it and all that follow, but for the look at the end."""
+        return 1 + int(np.argmin(self._begun(np.array([distance]), left - 1)))
+
+    def covers(self, distance: float) -> bool:
+        """Whether it is reckoned what to do at a distance."""
+        return bool(self._at[0] <= distance <= self._at[-1])
+
+    def acts_at(self, distance: float, speed: int, left: int) -> float:
+        """The distance at which the next command should act, where none acts before the given one."""
+        value = np.min(self._options[_row(left)][speed - 1], axis=0) - self._at / self._rates[speed - 1]
+        return float(self._at[np.where(self._at <= max(self._at[0], distance), value, NEVER_S * 2).argmin()])
+
+    def next(self, distance: float, speed: int, left: int) -> int:
+        """The speed that a command sets, where one acts at a distance; 0: it ends the motion; below 0: back."""
+        place = int(np.clip(round((distance - self._at[0]) / STEP_DEG), 0, len(self._at) - 1))
+        option = int(self._options[_row(left)][speed - 1][:, place].argmin())
+        return option if option < speed else speed - 1 - option
+
+    def from_rest(self, distances: Values, left: int) -> Values:
+        """How long it takes from rest at distances (positive) until it rests at the goal, commands at their price."""
+        least: Values = self._begun(distances, left - 1).min(axis=0)
+        return self._timing.usual + _price(left) + least
+
+    def _allowed(self, room: float, doubts: Values) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Where each speed may end; and where each may be followed by another. The slowest may always."""
+        tail, usual = self._timing.tail, self._timing.usual
+        room -= STEP_DEG  # what comes between two places
+        ends = self._at + room >= (FEAR * self._rates * tail + doubts)[:, None]
+        late, then = LATE_PART * tail * self._rates[:, None], (usual + AGAIN * tail) * self._rates
+        ends[0] = True
+        return ends, ends[:, None] & (self._at + room >= (late + then)[:, :, None])
+
+    def _reckon(self, left: int) -> None:
+        """One command more is left."""
+        ended, options = self._ended(left), []
+        away = [self._away(other, left - 1) for other in range(TURNS)]
+        for speed in range(len(self._rates)):
+            follows = [self._followed(speed, other, left - 1) for other in range(speed)]
+            turns = [self._turned(speed, other, away[other], left - 1) for other in range(TURNS)]
+            values = self._mean(np.array([ended, *follows, *turns]), speed)
+            values[0][~self._ends[speed]] = NEVER_S
+            values[1 : 1 + speed][~self._goes_on[speed, :speed]] = NEVER_S
+            values[1 + speed :, ~self._ends[speed]] = NEVER_S
+            options.append(values)
+        best = np.array([values.min(axis=0) for values in options]) + _price(left)
+        self._options.append(options)
+        self._best.append(np.minimum.accumulate(best - self._at / self._rates[:, None], axis=1))
+
+    def _ended(self, left: int) -> Values:
+        """Where it rests at a place: nothing more, or what it takes to put that right."""
+        off, after = np.abs(self._at), left - (LEG - 1)
+        again = np.where(self._at < 0, self.back.from_rest(off, after), self.from_rest(off, after))
+        missed: Values = np.clip((off - self._near) / STEP_DEG + 0.5, 0.0, 1.0)
+        return missed * (MISS * self._timing.usual + _price(left - 1) + again)
+
+    def _followed(self, speed: int, other: int, left: int) -> Values:
+        """Where another speed takes the place of one at a place."""
+        slows = float(self._slows[speed, other])
+        return slows + self._least(other, self._at, self._rates[other] * max(0.0, self._timing.usual - slows), left)
+
+    def _turned(self, speed: int, other: int, away: Values, left: int) -> Values:
+        """Where one turns back at a place; before the goal that leads `away`, and what then follows takes so long."""
+        stops = float(self._stops[speed])
+        reach = self._rates[other] * max(0.0, self._timing.usual - stops)
+        back = self.back._least(other, -self._at[self._behind], reach, left)
+        return stops + np.concatenate([back, away])
+
+    def _away(self, other: int, left: int) -> Values:
+        """Where a speed leads away from the goal, at places before it: until it is turned round again."""
+        usual = self._timing.usual
+        before = self._at[len(self._at[self._behind]) :]
+        return self.from_rest(before + self._rates[other] * usual, left)  # its start is answered after as long
+
+    def _begun(self, distances: Values, left: int) -> Values:
+        """Where each speed begins from rest: [speed; distance]."""
+        reaches = self._rates * self._timing.usual
+        return np.array([self._least(one, distances, reach, left) for one, reach in enumerate(reaches)])
+
+    def _least(self, speed: int, distances: Values, reach: float, left: int) -> Values:
+        """With a speed from distances on, until the best place for the next command; it can act after `reach`."""
+        if left < -MISSING:
+            return np.full(len(distances), NEVER_S)
+        first = distances - reach
+        value = distances / self._rates[speed] + np.interp(first, self._at, self._best[_row(left)][speed])
+        return np.where(first < self._at[0], NEVER_S, value)
+
+    def _mean(self, values: Values, speed: int) -> Values:
+        """The mean over where a command may act that should act at a place."""
+        count = values.shape[1]
+        total = np.concatenate([np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1)
+        half, middle = max(0.5, self._spreads[speed] / STEP_DEG), np.arange(count) + 0.5
+        low, high = np.maximum(middle - half, 0.0), np.minimum(middle + half, float(count))
+        mean: Values = (_between(total, high) - _between(total, low)) / (high - low)
+        return mean
+
+
+def _row(left: int) -> int:
+    return min(max(left, -MISSING), MOST) + MISSING
+
+
+def _price(left: int) -> float:
+    """What the command costs that is one of so many left, seconds."""
+    return PRICE_S if left > 0 else OVER_S
+
+
+def _between(rows: Values, index: Values) -> Values:
+    """The values of rows between their points."""
+    whole = np.minimum(index.astype(int), rows.shape[1] - 2)
+    before: Values = rows[:, whole]
+    part: Values = index - whole
+    return before + part * (rows[:, whole + 1] - before)
