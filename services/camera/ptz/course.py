@@ -33,7 +33,7 @@ class Course:
 
     def tell(self, reply: Reply, levels: tuple[int, int, int]) -> None:
         """A command was answered: from then on it turns like this."""
-        late = reply.received - reply.sent - self.skill.timing.usual
+        late = self.skill.timing.late(reply)
         for axis, level in enumerate(levels):
             if level != self.levels[axis]:
                 self.told[axis].append(Told(reply.received, late, level))
@@ -83,7 +83,7 @@ class Course:
     def read(self, reply: Reply, reading: Reading) -> None:
         """Takes in a reading."""
         self.read_at = reply.received
-        late = reply.received - reply.sent - self.skill.timing.usual
+        late = self.skill.timing.late(reply)
         pose = self.limits.pose(reading)
         for axis in (PAN, TILT, ZOOM):
             told = self.told[axis]

@@ -87,16 +87,14 @@ def longest(skill: Skill, here: Pose, there: Pose) -> float:
 
 def learn_on_the_way(skill: Skill, here: Pose, drive: Drive, begun: Reply, reply: Reply, seen: Pose) -> None:
     """A reading while it drives tells its speed, on the axes that do not slow down yet."""
-    usual = skill.timing.usual
+    timing = skill.timing
     for axis in (PAN, TILT):
         pace, way = skill.drives[axis], drive.to[axis] - here[axis]
         travel = (seen[axis] - here[axis]) * (1 if way > 0 else -1)
         braking = pace.other(HALF_CHANGE) * pace.rate(1) ** 2
         if LEAST_DEG < travel < abs(way) - 1.5 * braking - 3.0:
-            told = [Told(begun.received, begun.received - begun.sent - usual, 1)]
-            pace.learn(
-                told, Seen(reply.sent, reply.received - reply.sent - usual, travel, NOISE_DEG + NOISE_S * pace.rate(1))
-            )
+            told = [Told(begun.received, timing.late(begun), 1)]
+            pace.learn(told, Seen(reply.sent, timing.late(reply), travel, NOISE_DEG + NOISE_S * pace.rate(1)))
             pace.age()
 
 

@@ -145,7 +145,7 @@ class Helm:
 
     def _resting(self, reply: Reply, seen: Reading) -> Reading | None:
         """The reading of the rest that follows from one of the last bit of way, or is one; None: it may be neither."""
-        pace, late = self.skill.paces[PAN], reply.received - reply.sent - self.skill.timing.usual
+        pace, late = self.skill.paces[PAN], self.skill.timing.late(reply)
         when, moves = pace.seen_at(reply.sent, late), self._moves(seen) and self.zoom_ends is None
         slack = self._unsure(late)
         if seen.moving is False or self.quiet or any(self.course.levels[:2]) or when > self.course.rests_at() + slack:
@@ -181,6 +181,15 @@ class Helm:
     def reckoned(self, axis: int) -> float:
         """How far off the reckoned place of rest of an axis may be, degrees."""
         return 2 * self.skill.surprise * self._fastest(axis)
+
+    def way(self, axis: int, now: float) -> float:
+        """How far from its goal an axis would rest if its end were sent now, with its sign."""
+        return self.aim[axis] - self.course.stopped(axis, now + self.skill.timing.usual)
+
+    def room(self, axis: int, way: float) -> float:
+        """How much room there is behind its goal, in the direction in which it is gone to."""
+        low, high = self.limits.ranges[axis]
+        return high - self.aim[axis] if way > 0 else self.aim[axis] - low
 
     def fastest(self, axis: int, left: float) -> float:
         """The rate with which an axis that turns may go on, so many degrees before its stop.

@@ -54,9 +54,8 @@ class Homing:
     def _set_out(self, now: float) -> tuple[Ladder, int, int]:
         """From rest, or from where nothing is reckoned for: the way to the goal, its side, and the first speed."""
         way = self._way(TILT, now)
-        low, high = self.helm.limits.ranges[TILT]
         side = sign(way.distance) or 1
-        back = replace(way, distance=-BACK_DEG * side, room=high - low - way.room)
+        back = replace(way, distance=-BACK_DEG * side, room=self.helm.room(TILT, -side))
         ladder = Ladder(way, self.helm.skill, Ladder(back, self.helm.skill))
         return ladder, side, ladder.begins(abs(way.distance), self.helm.left - LOOK)
 
@@ -74,14 +73,12 @@ class Homing:
 
     def _way(self, axis: int, now: float) -> Way:
         helm = self.helm
-        distance = helm.aim[axis] - helm.course.stopped(axis, now + helm.skill.timing.usual)
-        low, high = helm.limits.ranges[axis]
-        room = high - helm.aim[axis] if distance > 0 else helm.aim[axis] - low
-        return Way(distance, room, helm.skill.paces[axis], helm.near)
+        distance = helm.way(axis, now)
+        return Way(distance, helm.room(axis, distance), helm.skill.paces[axis], helm.near)
 
     def _left(self, side: int, now: float) -> float:
         """How far tilt would rest before its goal if it were ended now; below 0: behind it."""
-        return side * (self.helm.aim[TILT] - self.helm.course.stopped(TILT, now + self.helm.skill.timing.usual))
+        return side * self.helm.way(TILT, now)
 
     def _leg(self, ladder: Ladder, speed: int, distance: float, left: int) -> Leg:
         """With a speed from a distance until the next command should act."""

@@ -206,7 +206,7 @@ class Hopping:
     def _glide(self, request: MoveOver, reply: Reply) -> None:
         """Where it leads, now that it is known from where."""
         helm = self.helm
-        late = reply.received - reply.sent - helm.skill.timing.usual
+        late = helm.skill.timing.late(reply)
         self.latest = max(self.latest, late)
         acted = reply.received - helm.skill.paces[PAN].other(ACT_PART) * late
         poses = [self._at(axis, acted) for axis in range(3)]

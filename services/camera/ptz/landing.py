@@ -176,7 +176,7 @@ def read(place: float, known: Doubts) -> End:
 
 def ends(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts], reply: Reply, pose: Pose) -> list[End]:
     """The ends of pan and tilt by the answer to a look that reads `pose`; odd where it rests too soon, or too late."""
-    late = reply.received - reply.sent - skill.timing.usual
+    late = skill.timing.late(reply)
     seen = skill.paces[PAN].seen_at(reply.sent, late)
     known = [replace(one, time=_time(skill, late, one.share)) for one in known]
     moving, over = cast(Reading, reply.result).moving, seen - max(glide.ends for glide in glides)

@@ -26,7 +26,7 @@ def rush(helm: Helm, reaches: tuple[float, float], now: float, *, zooms: bool) -
     rates = {axis: _top(helm.skill.paces[axis]) for axis in ways}
     lead = max(ways, key=lambda axis: abs(ways[axis]) / rates[axis])
     pace, way = helm.skill.paces[lead], ways[lead]
-    safe = abs(way) + _room(helm, lead, way) - rates[lead] * timing.tail - _brakes(pace)
+    safe = abs(way) + helm.room(lead, way) - rates[lead] * timing.tail - _brakes(pace)
     held = min(abs(way) - _before(pace, reaches[lead], timing.spread), safe) / rates[lead]
     held = min(held, _whole(pace, way) - (_zooming(helm) if zooms else 0.0))
     if held < BULK * timing.usual:
@@ -73,14 +73,9 @@ def _zooming(helm: Helm) -> float:
     return abs(helm.aim[ZOOM] - helm.course.origin[ZOOM]) / helm.skill.drives[ZOOM].rate(1)
 
 
-def _room(helm: Helm, axis: int, way: float) -> float:
-    low, high = helm.limits.ranges[axis]
-    return high - helm.aim[axis] if way > 0 else helm.aim[axis] - low
-
-
 def _along(helm: Helm, axis: int, way: float, held: float) -> int:
     """The speed of an axis beside the other: it stays before its goal, and if that ends late before its stop."""
-    pace, room = helm.skill.paces[axis], _room(helm, axis, way)
+    pace, room = helm.skill.paces[axis], helm.room(axis, way)
     for speed in reversed(pace.speeds):
         rate = pace.rate(speed)
         if rate * held <= abs(way) and rate * (held + helm.skill.timing.tail) <= abs(way) + room:

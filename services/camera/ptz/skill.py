@@ -12,6 +12,7 @@ from typing import Literal
 
 from services.camera.ptz.pace import PAN_RATES, READ_LATE, TILT_RATES, ZOOM_RATES, Pace
 from services.camera.ptz.planes import POINT, TURN, VIEW, Scale, scale_of
+from services.camera.requests import Reply
 
 RelativeForm = Literal["moveRelatively", "Position"]
 Honours = Literal["unknown", "no", "pan", "yes"]  # of a way to let the firmware drive; pan: it ignores tilt
@@ -67,6 +68,10 @@ class Timing:
         if len(ordered) >= 8:
             low, high = ordered[len(ordered) // 10], ordered[len(ordered) - 1 - len(ordered) // 10]
             self.spread = max(0.01, 0.6 * (high - low))
+
+    def late(self, reply: Reply) -> float:
+        """How much later than usual an answer came, seconds."""
+        return reply.received - reply.sent - self.usual
 
     @property
     def tail(self) -> float:

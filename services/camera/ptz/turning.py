@@ -153,9 +153,8 @@ class Turning:
     def _ways(self, axes: list[int], now: float) -> dict[int, Way]:
         ways = {}
         for axis in axes:
-            distance = self.helm.aim[axis] - self.helm.course.stopped(axis, now + self.helm.skill.timing.usual)
-            low, high = self.helm.limits.ranges[axis]
-            room = high - self.helm.aim[axis] if distance > 0 else self.helm.aim[axis] - low
+            distance = self.helm.way(axis, now)
+            room = self.helm.room(axis, distance)
             doubt = self.helm.course.doubt(axis, now) if self.helm.course.told[axis] else 0.0
             room -= 2 * max(0.0, doubt - LOST_DEG)
             fastest = self.helm.fastest(axis, abs(distance) + room) if self._runs_to(axis, distance) else inf
