@@ -20,6 +20,7 @@ from services.camera.ptz.outlook import Way
 ALONG = 1.0
 BACK_DEG = 10.0  # it goes no farther behind its goal
 LOOK = 1  # command, at the end
+MOST_STEPS = 20  # hardly ever more than eight; then it is ended where it is
 
 Watch = Callable[[Leg, dict[int, int], float], Plan[float]]
 
@@ -35,7 +36,9 @@ class Homing:
         helm, speed = self.helm, 0
         if abs(self._way(TILT, now).distance) > helm.near or not helm.course.told[TILT]:
             ladder, side, speed = self._set_out(now)
-        while speed:
+        for _ in range(MOST_STEPS):
+            if not speed:
+                break
             leg = self._leg(ladder, speed, self._left(side, now), helm.left - LOOK - 1)
             turning = {TILT: speed * side, PAN: self._along(leg.held, now)}
             turning = {axis: level for axis, level in turning.items() if level}

@@ -44,12 +44,12 @@ class Ladder:
         self._stops = np.array([way.pace.change(speed) for speed in way.pace.speeds])
         farthest = self._rates[-1] * (FEAR * skill.timing.tail + skill.timing.usual) + FARTHER_DEG
         self._at = np.arange(-BEYOND_DEG, min(farthest, abs(way.distance) + BEYOND_DEG / 2), STEP_DEG)
-        self._behind = slice(0, int(np.count_nonzero(self._at < 0)))
+        self._behind = int(np.count_nonzero(self._at < 0))  # places
         doubts = np.array([way.pace.doubt(speed) for speed in way.pace.speeds])
         read = np.minimum(doubts, READ_ON_THE_WAY * self._rates)
         self._spreads = self._rates * skill.timing.spread + DOUBTED * LONG * skill.timing.usual * read + NOISE_DEG
         self._ends, self._goes_on = self._allowed(way.room, FEARED * LONG * skill.timing.usual * doubts)
-        self._options: list[list[Values]] = []  # by commands left, and speed: [0: end it, or a speed below it; place]
+        self._options: list[list[Values]] = []  # by commands left, and speed: [end it, a speed below it, back; place]
         self._best: list[Values] = []  # by commands left: [speed; place], less the time to come there
         for left in range(-MISSING, MOST + 1):
             self._reckon(left)
@@ -119,14 +119,13 @@ class Ladder:
         """Where one turns back at a place; before the goal that leads `away`, and what then follows takes so long."""
         stops = float(self._stops[speed])
         reach = self._rates[other] * max(0.0, self._timing.usual - stops)
-        back = self.back._least(other, -self._at[self._behind], reach, left)
+        back = self.back._least(other, -self._at[: self._behind], reach, left)
         return stops + np.concatenate([back, away])
 
     def _away(self, other: int, left: int) -> Values:
         """Where a speed leads away from the goal, at places before it: until it is turned round again."""
-        usual = self._timing.usual
-        before = self._at[len(self._at[self._behind]) :]
-        return self.from_rest(before + self._rates[other] * usual, left)  # its start is answered after as long
+        farther = self._at[self._behind :] + self._rates[other] * self._timing.usual
+        return self.from_rest(farther, left)  # its start is answered after as long
 
     def _begun(self, distances: Values, left: int) -> Values:
         """Where each speed begins from rest: [speed; distance]."""
