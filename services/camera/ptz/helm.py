@@ -11,7 +11,7 @@ from services.camera.plan import Plan, ask, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM, Course
 from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE, READ_LATE, READ_PART, STOP_LATE
-from services.camera.ptz.skill import Skill
+from services.camera.ptz.skill import LATE_PART, Skill
 from services.camera.ptz.stand import stop as until_confirmed
 from services.camera.requests import Direction, Reading, Reply, Request, Start, Status
 
@@ -24,7 +24,6 @@ PAIR_S = 0.25  # between two readings that are compared
 UNSURE_LEVELS = 0.1  # it is not said to stand at the very end, which it may just have missed
 FOREVER = 1e12
 WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
-LATE_PART = 0.85  # of how late an answer may be, where a motion that it begins is ended only after it
 LAST_DEG, LAST_DOUBT = 0.5, 0.5  # the last bit of way, of which a reading tells the rest; a share of it is doubted
 RESTS_S = 0.02  # after it is reckoned to rest, where the camera does not tell it
 SLACK = 2.0  # such doubts of the moment that a reading tells of

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.camera.ptz.outlook import LEG, LONG, NOISE_DEG, OVER_S, READ_ON_THE_WAY, Way
-from services.camera.ptz.skill import Skill
+from services.camera.ptz.skill import LATE_PART, Skill
 
 STEP_DEG = 0.1  # of the distances that are reckoned with
 BEYOND_DEG = 12.0  # as far behind the goal
@@ -24,8 +24,10 @@ MISSING = 3  # commands that may be missing
 PRICE_S = 0.08  # of a command, while there are enough
 MISS = 3.0  # answers: a miss is put right from rest, and so much later
 DOUBTED, FEARED = 0.5, 2.0  # of the doubt about a rate: what counts usually, and where a stop is near
-LATE_PART = 0.85  # of how late an answer may be, before a slower speed that may be late, too
-AGAIN, FEAR = 0.35, 1.1  # parts of it: the second answer in a row that is late; and the one that is an end
+AGAIN, FEAR = (
+    0.35,
+    1.1,
+)  # parts of how late an answer may be: the second answer in a row that is late; and the one that is an end
 NEVER_S = 60.0
 
 Values = NDArray[np.float64]

@@ -45,7 +45,6 @@ class Leg:
     parts: dict[int, Part]
     joint: bool = True
     cost: float = 0.0
-    chance: float = 0.0  # that no correction is needed
 
     @property
     def feared(self) -> bool:
@@ -130,4 +129,4 @@ def _judged(leg: Leg, outlook: Outlook, left: int, runs: dict[int, int]) -> Leg:
     arrives = prod(chances) if len(leg.parts) == len(ways) else 0.0
     cost = leg.held + (1 - arrives) * correction + (0.0 if leg.joint else COMMAND_S) - (COMMAND_S if running else 0.0)
     cost += outlook.rung(left) if leg.feared else 0.0
-    return replace(leg, cost=cost, chance=arrives)
+    return replace(leg, cost=cost)

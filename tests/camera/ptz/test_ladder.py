@@ -9,10 +9,10 @@ from statistics import mean
 import numpy as np
 import pytest
 
-from services.camera.ptz.ladder import AGAIN, LATE_PART, Ladder
+from services.camera.ptz.ladder import AGAIN, Ladder
 from services.camera.ptz.outlook import Way
 from services.camera.ptz.pace import TILT_RATES, Pace
-from services.camera.ptz.skill import Skill
+from services.camera.ptz.skill import LATE_PART, Skill
 
 NEAR = 0.42
 BACK = Way(-10.0, 100.0, Pace(TILT_RATES), NEAR)
