@@ -12,6 +12,7 @@ from statistics import median
 import httpx
 
 from services.simulators.camera.firmwares import PROFILES
+from services.simulators.camera.profiles import Profile
 from services.simulators.world import load
 from tests import bounds
 from tests.camera.goals import (
@@ -24,6 +25,7 @@ from tests.camera.goals import (
     outcomes,
     random_goals,
     wanted,
+    with_other_motors,
     with_presets,
 )
 from tests.camera.least_time import Hops, least_by_hops, least_time
@@ -33,6 +35,7 @@ SEED = 1
 RELATIVE = "ip2m-841b-strict"  # it takes a relative position, and no other
 COMPARED = "ip3m-941w-2019"
 THE_REPORT_S_GOALS = 10
+EACH = 10  # goals of a camera with other motors
 
 
 @dataclass
@@ -63,6 +66,10 @@ def rows() -> list[Row]:
         _row(f"{name}, calibrated", outcomes(profile, goals, SEED, calibrated=True), wanted(profile, calibrated=True))
         for name, profile in PROFILES.items()
     ]
+    ours += [
+        _row(f"{name}, calibrated, other motors", _other_motors(profile, goals), wanted(profile, calibrated=True))
+        for name, profile in PROFILES.items()
+    ]
     few = _row(f"{COMPARED}, the first {THE_REPORT_S_GOALS}", found[COMPARED][:THE_REPORT_S_GOALS], bound[COMPARED])
     return [
         *ours,
@@ -70,6 +77,16 @@ def rows() -> list[Row]:
         *_presets(goals),
         few,
         _row(f"{COMPARED}, the report's controller", the_report_s(), None),
+    ]
+
+
+def _other_motors(profile: Profile, goals: list[tuple[float, float, float]]) -> list[Outcome]:
+    """The same goals in cameras that differ in how fast all is, each ten of them in another one."""
+    shares = [goals[first : first + EACH] for first in range(0, len(goals), EACH)]
+    return [
+        one
+        for camera, share in enumerate(shares)
+        for one in outcomes(with_other_motors(profile, camera), share, camera, calibrated=True)
     ]
 
 

@@ -129,7 +129,7 @@ class Rig:
 
     def calibrate(self) -> None:
         """What the order for it does, before any goal."""
-        run = self.drive(calibrate(LIMITS, self.skill))
+        run = self.drive(calibrate(LIMITS, self.skill), limit_s=1500.0)
         assert run.error is None, run.error
         self.near = cast(Arrival, run.result).reading
         self.now += 1.0
@@ -143,12 +143,12 @@ class Rig:
         """For how long pan and tilt were pushed against their ends, seconds; a digital zoom has none."""
         return sum(self.device.ptz.motors.worked(self.now).pushed_s[:2])
 
-    def drive(self, plan: Plan[Any]) -> Run:
+    def drive(self, plan: Plan[Any], limit_s: float = 300.0) -> Run:
         """Runs a plan to its end."""
         waiting: list[tuple[Request, int]] = []
         stage = Stage(lambda request, ticket: waiting.append((request, ticket)))
         run = stage.begin(plan, self.now, lambda run, now: None)
-        end = self.now + 300.0
+        end = self.now + limit_s
         while not run.done:
             assert self.now < end, "the plan does not end"
             if waiting:
@@ -195,6 +195,22 @@ def constants(profile: Profile) -> Constants:
     return Constants(
         (top, top * profile.tilt_share, profile.zoom_speed),
         (profile.pan_acceleration, profile.tilt_acceleration, profile.zoom_acceleration),
+    )
+
+
+def with_other_motors(profile: Profile, seed: int) -> Profile:
+    """The same firmware in a camera that nobody has seen: how fast all is in it is drawn at random."""
+    rng = random.Random(seed)
+    slowest, ratio, latency = rng.uniform(0.6, 1.4), rng.uniform(1.4, 1.75), rng.uniform(0.15, 0.45)
+    return replace(
+        profile,
+        pan_speeds=tuple(slowest * ratio**step for step in range(len(profile.pan_speeds))),
+        tilt_share=rng.uniform(0.4, 1.0),
+        pan_acceleration=rng.uniform(60.0, 300.0),
+        tilt_acceleration=rng.uniform(60.0, 300.0),
+        zoom_speed=rng.uniform(1.5, 6.0),
+        latency_s=latency,
+        latency_spread_s=latency * rng.uniform(0.15, 0.45),
     )
 
 

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import STOP_LATE, Seen, Told
-from services.camera.ptz.skill import Skill
+from services.camera.ptz.skill import ZOOM_SLOWS_S, Skill
 from services.camera.requests import Reading, Reply
 
 PAN, TILT, ZOOM = range(3)
 END = 0.15  # degrees or levels: as near as that to an end of its range, an axis may have been stopped by it
 READ_DEG = 0.08  # the resolution, and a little dither
 GRID = 2.0  # levels: the steps in which zoom may be told, while that is not known
-ZOOM_SLOWS_S = 0.1  # coarse readings do not teach how long zoom takes to stop
+COARSE = 0.3  # of a step of its reading: standard deviation
+MOVED_DEG = 0.3  # no reading at rest changes as much
 CLEAR_DEG = 2.0  # so far the wrong way is not a doubtful reading
 TIME_S = 0.01  # what is left of the timing of a command or a reading when all that is learnt is taken off
 
@@ -30,6 +31,7 @@ class Course:
         self.shift = [0.0, 0.0, 0.0]  # what readings say beyond the model
         self.levels = [0, 0, 0]
         self.read_at = 0.0  # when the latest reading came
+        self._zoom_at_rest: tuple[float, int] | None = None  # how it was read there, after so many commands
 
     def tell(self, reply: Reply, levels: tuple[int, int, int]) -> None:
         """A command was answered: from then on it turns like this."""
@@ -87,7 +89,9 @@ class Course:
         pose = self.limits.pose(reading)
         for axis in (PAN, TILT, ZOOM):
             told = self.told[axis]
-            if not told or (axis != ZOOM and not self.skill.senses[axis].sure):
+            if told and not self.skill.senses[axis].sure:
+                self._see_sense(axis, pose[axis])
+            if not told or not self.skill.senses[axis].sure:
                 continue
             if axis == ZOOM:
                 self.skill.paces[ZOOM].borrow(self.skill.paces[PAN])
@@ -100,19 +104,32 @@ class Course:
         low, high = self.limits.ranges[axis]
         seen_at = pace.seen_at(reply.sent, late)
         speed = abs(pace.velocity(told, seen_at))
-        grid = self.skill.zoom_grid or GRID if axis == ZOOM else 0.0
-        noise = 0.3 * grid + READ_DEG
         changes = [abs(one.level) for one in told]
         timing = TIME_S * max((pace.rate(level) for level in changes if level), default=0.0)
+        noise = READ_DEG + (COARSE * (self.skill.zoom_grid or GRID) if axis == ZOOM else 0.0)
         seen = Seen(reply.sent, late, value - self.origin[axis], (noise**2 + (TIME_S * speed) ** 2 + timing**2) ** 0.5)
         inside = low + END < value < high - END
         farther = abs(seen.travel) > abs(pace.expected(told, seen)[0])
-        if inside or farther:  # at an end it may have been stopped, having come at least so far
+        again = axis == ZOOM and self._again(value, rests=not speed)
+        if not again and (inside or farther):  # at an end it may have been stopped, having come at least so far
             pace.learn(told, seen)
         if axis != ZOOM or not speed:
             model = self.origin[axis] + pace.travel(told, pace.seen_at(reply.sent, late))
             own, read = timing**2 + 0.05**2, noise**2 + (TIME_S * 2 * speed) ** 2
             self.shift[axis] = (value - model) * own / (own + read)
+
+    def _again(self, value: float, *, rests: bool) -> bool:
+        """Whether zoom was read the same at this rest: its coarse reading once more tells nothing new."""
+        before, self._zoom_at_rest = self._zoom_at_rest, (value, len(self.told[ZOOM])) if rests else None
+        return rests and before == self._zoom_at_rest
+
+    def _see_sense(self, axis: int, value: float) -> None:
+        """Which way an axis turns is clear as soon as it has moved."""
+        moved = value - self.origin[axis]
+        if abs(moved) >= MOVED_DEG:
+            self.skill.senses[axis].sure = True
+            if moved * next(one.level for one in reversed(self.told[axis]) if one.level) < 0:
+                self.flip(axis)
 
     def _doubt_sense(self, axis: int, reply: Reply, late: float, value: float) -> None:
         """An axis that has clearly gone the other way all the time: which way it turns was wrong, or changed."""

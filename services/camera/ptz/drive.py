@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import sqrt
-from typing import Literal
+from math import inf, sqrt
+from typing import Literal, cast
 
-from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.course import GRID, PAN, TILT, ZOOM
+from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told
-from services.camera.ptz.skill import Skill
-from services.camera.requests import GotoPreset, MoveTo, Reply
+from services.camera.ptz.skill import ZOOM_SLOWS_S, Skill
+from services.camera.requests import GotoPreset, MoveTo, Reading, Reply
 
 ABSOLUTE: tuple[Literal["PositionABS", "moveAbsolutely"], ...] = ("PositionABS", "moveAbsolutely")
 PRESET_DEG = 2.0  # a preset as near to the goal as that is worth going to
@@ -25,6 +26,8 @@ BESIDE_DEG = 6.0  # farther from what was asked for, it was not honoured
 LEAST_DEG = 0.3
 ZOOM_LATE_S = 0.04  # it may still slow down when its coarse reading is the last one
 NOISE_DEG, NOISE_S = 0.2, 0.03  # of a reading on the way
+SLOWEST = 2.0  # standard deviations that zoom may be slower than is known
+NOISE_LEVELS = 0.5  # of where zoom was on its way, at the edge of a step of its reading
 WITHIN_DEG = 0.1  # what is asked for stays so far from an end stop
 
 
@@ -34,6 +37,29 @@ class Drive:
 
     request: MoveTo | GotoPreset
     to: Pose
+
+
+@dataclass(frozen=True)
+class Begun:
+    """One under way: from where, and the answer that it began with."""
+
+    drive: Drive
+    here: Pose
+    reply: Reply
+
+    @property
+    def zooms(self) -> bool:
+        """Whether zoom is on its way, too."""
+        return self.here[ZOOM] != self.drive.to[ZOOM]
+
+    def arrives(self, skill: Skill) -> float:
+        """When it should be there, as far as is known by now."""
+        return self.reply.received + longest(skill, self.here, self.drive.to)
+
+    def look(self, skill: Skill, reply: Reply, seen: Pose) -> None:
+        """What a look on the way, or at its end, tells of its speed; `seen`: its reading as a pose."""
+        learn_on_the_way(skill, self.here, self.drive, self.reply, reply, seen)
+        see_zoom(skill, zooming(skill, self.here[ZOOM], self.drive.to[ZOOM], self.reply.received), reply)
 
 
 def find(
@@ -81,7 +107,8 @@ def seconds(pace: Pace, distance: float) -> float:
 
 def longest(skill: Skill, here: Pose, there: Pose) -> float:
     """How long the firmware needs for all axes."""
-    pan, tilt, zoom = (seconds(pace, abs(b - a)) for pace, a, b in zip(skill.drives, here, there, strict=True))
+    ways = (abs(b - a) for a, b in zip(here, there, strict=True))
+    pan, tilt, zoom = (seconds(skill.drive(axis), way) for axis, way in enumerate(ways))
     return max(pan, tilt, zoom + ZOOM_LATE_S if zoom else 0.0)
 
 
@@ -89,13 +116,43 @@ def learn_on_the_way(skill: Skill, here: Pose, drive: Drive, begun: Reply, reply
     """A reading while it drives tells its speed, on the axes that do not slow down yet."""
     timing = skill.timing
     for axis in (PAN, TILT):
-        pace, way = skill.drives[axis], drive.to[axis] - here[axis]
+        pace, way = skill.drive(axis), drive.to[axis] - here[axis]
         travel = (seen[axis] - here[axis]) * (1 if way > 0 else -1)
         braking = pace.other(HALF_CHANGE) * pace.rate(1) ** 2
         if LEAST_DEG < travel < abs(way) - 1.5 * braking - 3.0:
             told = [Told(begun.received, timing.late(begun), 1)]
             pace.learn(told, Seen(reply.sent, timing.late(reply), travel, NOISE_DEG + NOISE_S * pace.rate(1)))
             pace.age()
+
+
+def zooming(skill: Skill, here: float, to: float, acted: float) -> Glide:
+    """The way of zoom from rest, levels; `acted`: when it begins."""
+    top = skill.drive(ZOOM).rate(1)
+    return Glide(acted, here, 0.0, to, top, top / ZOOM_SLOWS_S, acted)
+
+
+def zoomed_by(skill: Skill, glide: Glide) -> float:
+    """When zoom rests, on its way from rest, at the latest; as far as its speed is known by now."""
+    pace, way = skill.drive(ZOOM), abs(glide.goal - glide.place)
+    slowest = max(pace.rate(1) / 2, pace.rate(1) - SLOWEST * pace.doubt(1))
+    return glide.began + (way / slowest + ZOOM_SLOWS_S if way else 0.0)
+
+
+def see_zoom(skill: Skill, glide: Glide, reply: Reply) -> None:
+    """What a look shows of zoom on its way from rest: its speed, or where it has arrived, that it is no slower."""
+    pace, timing, way = skill.drive(ZOOM), skill.timing, abs(glide.goal - glide.place)
+    seen = abs(cast(Reading, reply.result).zoom - glide.place)
+    half = (skill.zoom_grid or GRID) / 2
+    if way <= half or glide.began >= reply.sent:
+        return
+    pace.borrow(skill.paces[PAN])
+    told = [Told(glide.began, 0.0, 1)]
+    low, high = seen - half, inf if seen > way - half - NOISE_LEVELS else seen + half
+    shown = Seen(reply.sent, timing.late(reply), seen, NOISE_LEVELS)
+    expected, _ = pace.expected(told, shown)
+    if not low <= expected <= high:
+        pace.learn(told, shown._replace(travel=min(high, max(low, expected))))
+        pace.age()
 
 
 def judge(skill: Skill, here: Pose, drive: Drive, there: Pose) -> None:

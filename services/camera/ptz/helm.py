@@ -9,6 +9,7 @@ from typing import cast
 from services.camera.device import same
 from services.camera.plan import Plan, ask, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM, Course
+from services.camera.ptz.drive import Begun
 from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE, READ_LATE, READ_PART, STOP_LATE
 from services.camera.ptz.skill import LATE_PART, Skill
@@ -45,7 +46,7 @@ class Helm:
         self.commands = 0
         self.turned: set[int] = {PAN, TILT}  # since it was last judged where they rest
         self.zoom_ends: float | None = None
-        self.quiet = 0.0  # until then the firmware drives by itself
+        self.driven: Begun | None = None  # what the firmware drives by itself
         self.foretold = False  # whether where it stands was
         self.rests = 0.0  # when it came to rest, as is reckoned
         self.course = Course(limits, skill, self.aim)
@@ -59,6 +60,11 @@ class Helm:
     def near(self) -> float:
         """As near as that a reading of pan or tilt has arrived, degrees."""
         return max(self.skill.near, self.goal.near)
+
+    @property
+    def quiet(self) -> float:
+        """Until then the firmware drives by itself; 0: it does not."""
+        return self.driven.arrives(self.skill) if self.driven is not None else 0.0
 
     def pose(self, reading: Reading) -> Pose:
         """A reading as a pose, with what is known better of zoom."""
@@ -112,25 +118,36 @@ class Helm:
             now = yield from self.stop((yield from wait(max(now, self.zoom_ends))))
             settled = self._settled()
         now = yield from wait(max(now, settled))
-        self.rests = max(self.quiet, self.course.rests_at())
+        self.rests = self._rests()
         reply, seen, reading = yield from self._look()
+        since = reply.sent
         while reading is None or (
             self.zoom_ends is None and (pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading))
         ):
             yield from wait(reply.sent + PAIR_S)
             before = seen
             reply, seen, reading = yield from self._look()
-            if same(before, seen) and self.zoom_ends is None:
+            since = since if same(before, seen) else reply.sent
+            if reply.sent - since >= self._pair() and self.zoom_ends is None:
                 self.skill.always_moving = seen.moving is True
                 reading = seen
                 break
         self.foretold = reading is not seen
-        rests = 0.0 if seen.moving is False else self.rests + self._unsure(0.0) + RESTS_S
+        rests = 0.0 if seen.moving is False else self._rests() + self._unsure(0.0) + RESTS_S
         if self.zoom_ends is not None:
             self.time_zoom(reply.received)
         self._place_zoom(reading)
+        self.driven = None
         self.stand(reading)
         return reading, (yield from wait(max(reply.received, rests)))
+
+    def _rests(self) -> float:
+        """When it comes to rest, as far as is known by now."""
+        return max(self.quiet, self.course.rests_at())
+
+    def _pair(self) -> float:
+        """Over how many seconds readings have to be equal to show a camera at rest."""
+        return max(PAIR_S, self.skill.step_s) if self.driven is not None and self.driven.zooms else PAIR_S
 
     def _look(self) -> Plan[tuple[Reply, Reading, Reading | None]]:
         """A look where it should rest: the answer, its reading, and that of the rest; None: not known by this one."""
@@ -139,6 +156,8 @@ class Helm:
         rest = self._resting(reply, seen)
         self._weigh(rest or seen)
         self._see_still(rest or seen)
+        if self.driven is not None:
+            self.driven.look(self.skill, reply, self.limits.pose(seen))
         self.course.read(reply, seen)
         return reply, seen, rest
 
@@ -233,7 +252,7 @@ class Helm:
         doubt = pace.other_doubt(READ_LATE) + self._slows()
         if self.quiet:  # otherwise what is seen on its last bit of way tells the rest, too
             doubt += pace.other(READ_PART) * self.skill.timing.spread / 2  # one that comes too soon says that it moves
-        return max(self.quiet, self.course.rests_at()) - self.skill.read_late + min(LONGEST_DOUBT_S, doubt)
+        return self._rests() - self.skill.read_late + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:
         """Where zoom truly stands: what was reckoned, as far as its reading and its range allow; as before, at rest."""

@@ -68,11 +68,11 @@ class Homing:
         pan, tilt, zoom = (helm.course.stopped(axis, now) for axis in range(3))
         here = (pan, tilt, zoom)
         way = own.to_pan(here, (helm.aim[PAN], here[TILT], helm.goal.pose[ZOOM]))
-        now = (yield from helm.send(way.request)).received
-        here = (pan, helm.course.stopped(TILT, now), zoom)
+        begun = yield from helm.send(way.request)
+        here = (pan, helm.course.stopped(TILT, begun.received), zoom)
         helm.course.leave(here)
-        helm.quiet = now + own.longest(helm.skill, here, way.to)
-        return now
+        helm.driven = own.Begun(way, here, begun)
+        return begun.received
 
     def _way(self, axis: int, now: float) -> Way:
         helm = self.helm

@@ -11,11 +11,13 @@ large the scale is (`planes.py`), what hops teach (`scale.py`).
 from __future__ import annotations
 
 from dataclasses import replace
+from math import copysign
 from typing import cast
 
 from services.camera.plan import Plan, wait
+from services.camera.ptz import drive as own
 from services.camera.ptz import landing, scale
-from services.camera.ptz.course import PAN, TILT, ZOOM, ZOOM_SLOWS_S
+from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.driving import at_rest
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
@@ -24,7 +26,7 @@ from services.camera.ptz.pace import ACT_PART, HALF_CHANGE
 from services.camera.ptz.planes import Planes, Scale
 from services.camera.ptz.rush import rush
 from services.camera.ptz.scale import Hop, Turned
-from services.camera.ptz.skill import RelativeForm
+from services.camera.ptz.skill import ZOOM_SLOWS_S, RelativeForm
 from services.camera.requests import MoveOver, Reading, Refused, Reply, Status
 
 MOST = 6  # hops without a rest
@@ -52,6 +54,7 @@ class Hopping:
         self.turns = 0
         self.zooms = False  # whether zoom is to change
         self.glides: list[Glide] = []
+        self.zooming = Glide(0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0)  # zoom's since it last stood
         self.hops: list[Hop] = []
         self.foretold = 0.0  # degrees: doubt of where the hops began, where that was foretold
         self.latest = 0.0  # seconds: how much later than usual a hop was answered at most
@@ -94,7 +97,9 @@ class Hopping:
         arrives = max(self._ends(), zoom.ends)
         self.helm.rests = arrives
         about = 0.0 if self._exact(to) else ABOUT_DEG
-        reading, now, _ = yield from at_rest(self.helm, arrives, to, now, certain=certain, about=about, hops=True)
+        reading, now, _ = yield from at_rest(
+            self.helm, arrives, to, now, self.zooming, certain=certain, about=about, hops=True
+        )
         if certain and self._timely:
             known = landing.doubts(self.helm.skill, self.form, self.hops, self.foretold)
             rest = [landing.read(*one) for one in zip(self.helm.limits.pose(reading), known, strict=False)]
@@ -120,6 +125,7 @@ class Hopping:
             yield from wait(max(now, look))
             reply = yield from helm.send(Status())
             reading, now = cast(Reading, reply.result), reply.received
+            own.see_zoom(helm.skill, self.zooming, reply)
             arrives = max(self._ends(), self.glides[ZOOM].ends)
             ends = landing.ends(helm.skill, self.glides, doubts, reply, helm.limits.pose(reading))
             landing.stray(self._scale, self.glides, doubts, ends)
@@ -132,7 +138,7 @@ class Hopping:
             helm.stand(reading)
             helm.rests = arrives
             if verdict == "there" or helm.left < FEW or not helm.beside(helm.limits.pose(reading)):
-                return reading, (yield from wait(max(now, arrives + RESTS_S)))
+                return reading, (yield from wait(max(now, arrives + RESTS_S, own.zoomed_by(helm.skill, self.zooming))))
             began = min(arrives, now)
             for axis, end in enumerate(ends):
                 self.glides[axis] = replace(self.glides[axis], began=began, place=end.at, speed=0.0, goal=end.at)
@@ -219,14 +225,20 @@ class Hopping:
         self.glides = []
         for axis, (way, (place, speed)) in enumerate(zip((right, down, request.zoom), poses, strict=True)):
             low, high = helm.limits.ranges[axis]
-            pace = helm.skill.drives[ZOOM] if axis == ZOOM else helm.skill.paces[axis]
+            pace = helm.skill.drive(ZOOM) if axis == ZOOM else helm.skill.paces[axis]
             top, slow = pace.rate(pace.speeds[-1]), 2 * pace.other(HALF_CHANGE)
             slow = ZOOM_SLOWS_S / top if axis == ZOOM else slow
             goal = min(high, max(low, place + way))
             self.glides.append(Glide(acted, place, speed, goal, top, 1 / slow, reply.received))
         begun, speeds = ((pan, tilt, zoom) for pan, tilt, zoom in zip(*poses, strict=True))
         tops = (self.glides[PAN].top, self.glides[TILT].top, self.glides[ZOOM].top)
-        self.hops.append(Hop(begun, (pan, tilt), (right, down, request.zoom), speeds, tops, turned, rested))
+        zoomed = copysign(acted - self.zooming.began, speeds[ZOOM]) if speeds[ZOOM] else 0.0
+        unsure = abs(zoomed) * helm.skill.drive(ZOOM).doubt(1)
+        self.hops.append(
+            Hop(begun, (pan, tilt), (right, down, request.zoom), speeds, tops, turned, rested, zoomed, unsure)
+        )
+        if not zoomed:
+            self.zooming = self.glides[ZOOM]
         helm.course.leave(begun)
 
     def _turned(self, acted: float, reply: Reply, late: float) -> tuple[Turned, Turned]:

@@ -30,7 +30,7 @@ MOST = (0.05, 0.6, 1.0, 1.0, 1.0)
 RATE_DOUBT, SLOW_DOUBT = 0.7, 0.05  # of the guess; of how much slower it is than the highest speed
 COMMON, NEIGHBOURS = 0.5, 4.0  # what all speeds have in common; and how many steps apart they say little of another
 SLOWEST = 0.05
-FLOOR = 0.2  # of the guess: what other speeds teach of one makes it no slower
+FLOOR = 0.05  # of the guess: what other speeds teach of one makes it no slower
 DRIFT = 0.002  # of each rate, per motion: motors age
 DOUBT_AGAIN = 0.01  # of the first guess's covariance, when what is known was wrong
 AGAIN_DEG = 0.5  # no reading is so far off: an axis that rests there has come another way than was known
@@ -162,6 +162,19 @@ class Pace:
             self.mean[number] = better.mean[other]
             self.cov[number, :] = self.cov[:, number] = 0.0
             self.cov[number, number] = better.cov[other, other]
+
+    def suppose(self, rate: float, part: float, half_change: float) -> None:
+        """Its one rate is known from elsewhere but for such a share, and how fast it changes speed, too."""
+        self.mean[0], self.mean[1 + HALF_CHANGE] = rate, half_change
+        self.cov[0, :] = self.cov[:, 0] = 0.0
+        self.cov[0, 0] = (part * rate) ** 2
+
+    def correct(self, speed: int, slope: float, wrong: float, noise: float) -> None:
+        """What changes by `slope` with a rate was `wrong`; `noise`: standard deviation of that."""
+        slopes = np.zeros_like(self.mean)
+        slopes[speed - 1] = slope
+        self.mean, self.cov = taught(self.mean, self.cov, slopes, wrong, noise)
+        self._keep_within()
 
     def age(self) -> None:
         """A motion is over: motors and networks change, so nothing stays known for ever."""

@@ -13,6 +13,8 @@ from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.pace import HALF_CHANGE, Pace
 from services.camera.requests import Reading, Status
 
+FEARED = 1.0  # of the doubt about a rate, where a stop is near
+MOST_HOPS = 4  # are left, although zoom has to wait for them
 BULK = 1.5  # answers: one that is shorter is not worth it
 LATE_LOOK = 2.0  # answers: a look as late as that does not delay what it is for
 
@@ -26,9 +28,10 @@ def rush(helm: Helm, reaches: tuple[float, float], now: float, *, zooms: bool) -
     rates = {axis: _top(helm.skill.paces[axis]) for axis in ways}
     lead = max(ways, key=lambda axis: abs(ways[axis]) / rates[axis])
     pace, way = helm.skill.paces[lead], ways[lead]
-    safe = abs(way) + helm.room(lead, way) - rates[lead] * timing.tail - _brakes(pace)
-    held = min(abs(way) - _before(pace, reaches[lead], timing.spread), safe) / rates[lead]
-    held = min(held, _whole(pace, way) - (_zooming(helm) if zooms else 0.0))
+    safe = (abs(way) + helm.room(lead, way) - _brakes(pace)) / _most(pace, pace.speeds[-1]) - timing.tail
+    held = min((abs(way) - _before(pace, reaches[lead], timing.spread)) / rates[lead], safe)
+    early = _whole(pace, way) - (_zooming(helm) if zooms else 0.0)  # so that zoom is there as soon
+    held = min(held, max(early, (abs(way) - MOST_HOPS * reaches[lead]) / rates[lead]))
     if held < BULK * timing.usual:
         return now
     turning = {axis: _along(helm, axis, way, held) * sign(way) for axis, way in ways.items() if helm.skill.diagonals}
@@ -53,6 +56,11 @@ def _top(pace: Pace) -> float:
     return pace.rate(pace.speeds[-1])
 
 
+def _most(pace: Pace, speed: int) -> float:
+    """The rate that a speed may have."""
+    return pace.rate(speed) + FEARED * pace.doubt(speed)
+
+
 def _whole(pace: Pace, way: float) -> float:
     """How long an axis takes from rest to rest."""
     return abs(way) / _top(pace) + pace.change(pace.speeds[-1])
@@ -70,14 +78,14 @@ def _before(pace: Pace, reach: float, spread: float) -> float:
 
 def _zooming(helm: Helm) -> float:
     """How long zoom takes, which a start at full speed puts off."""
-    return abs(helm.aim[ZOOM] - helm.course.origin[ZOOM]) / helm.skill.drives[ZOOM].rate(1)
+    return abs(helm.aim[ZOOM] - helm.course.origin[ZOOM]) / helm.skill.drive(ZOOM).rate(1)
 
 
 def _along(helm: Helm, axis: int, way: float, held: float) -> int:
     """The speed of an axis beside the other: it stays before its goal, and if that ends late before its stop."""
     pace, room = helm.skill.paces[axis], helm.room(axis, way)
     for speed in reversed(pace.speeds):
-        rate = pace.rate(speed)
-        if rate * held <= abs(way) and rate * (held + helm.skill.timing.tail) <= abs(way) + room:
+        late = _most(pace, speed) * (held + helm.skill.timing.tail)
+        if pace.rate(speed) * held <= abs(way) and late <= abs(way) + room:
             return speed
     return 0

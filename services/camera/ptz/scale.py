@@ -18,8 +18,10 @@ from services.camera.requests import Reading
 STAYED_DEG = 0.3
 FAR_DEG = 3.0  # a shorter way is no measure for how far off it ended
 OFF_COUNTS, OFF_MOST = 0.2, 0.25  # of a way: what each chain of hops adds to what is usual, and how far off is too far
-READ_DEG, TIME_S = 0.1, 0.003  # of a reading; when a hop took effect
-LEVELS = 0.5  # where zoom is while it turns
+READ_DEG, TIME_S = 0.08, 0.003  # of a reading; when a hop took effect
+LEVELS = 0.5  # where zoom is while it turns, beside the doubt of its rate
+ZOOMED = 0.4  # of the doubt about where zoom was, for what a hop tells of the scale
+KNOWN = 0.08  # of zoom's rate: as well known as that, it is told more exactly by where hops led
 SHARE = 0.8  # of the way that the first hop of a chain went; less tells little of the motor before it
 TIMED = 0.5  # of the time that an axis takes to slow down: with less doubt it is known when it rests
 ALIKE = 2.0  # what each of two takes from one reading, the other took too: so often more doubt is left to both
@@ -41,7 +43,8 @@ class Hop:
     """Where one began, by which parts and how far it should go, how fast each axis was then, and can be.
 
     `parts` as the readings count, of pan and tilt; the others in degrees and levels. `turned`: what pan and tilt did
-    before, where the hop is the first one; `rested`: how many seconds they had, where another one was before.
+    before, where the hop is the first one; `rested`: how many seconds they had, where another one was before. `zoomed`:
+    for so many seconds zoom had been on its way, with the sign of that, 0 at rest; `unsure`: levels that leaves open.
     """
 
     begun: Pose
@@ -51,6 +54,8 @@ class Hop:
     tops: Pose
     turned: tuple[Turned, Turned] | None
     rested: float
+    zoomed: float = 0.0
+    unsure: float = 0.0
 
 
 def zooms(form: RelativeForm) -> str:
@@ -110,7 +115,7 @@ def timed(skill: Skill, hops: Sequence[Hop]) -> bool:
 def doubts(scale: Scale, hops: Sequence[Hop], axis: int) -> tuple[float, float]:
     """Standard deviations of the end of a chain, degrees: because of its hops, because of where the first one began."""
     told = _told(scale.planes, axis, hops, 0.0)
-    return hypot(told.doubt, told.noise), told.before
+    return hypot(told.doubt, told.noise, told.zoomed), told.before
 
 
 def _weigh(
@@ -132,12 +137,16 @@ def _learn(skill: Skill, form: RelativeForm, axis: int, hops: Sequence[Hop], wro
     for planes in skill.scales[form].laws:
         planes.age()
         told = _told(planes, axis, hops, read)
-        planes.learn(told.slope, wrong - told.beside, hypot(told.noise, told.before))
+        planes.learn(told.slope, wrong - told.beside, hypot(told.noise, told.before, ZOOMED * told.zoomed))
         if planes is believed and turned is not None and turned[axis].told and told.share > SHARE:
             travel = hops[0].begun[axis] + wrong / told.share - turned[axis].origin
-            noise = ALIKE * hypot(told.noise, told.doubt) / told.share
+            noise = ALIKE * hypot(told.noise, told.doubt, told.zoomed) / told.share
             seen = Seen(turned[axis].answered, turned[axis].late, travel, noise, acts=True)
             skill.paces[axis].learn(turned[axis].told, seen)
+        drive = skill.drive(ZOOM)
+        if planes is believed and told.zoom and drive.doubt(1) < KNOWN * drive.rate(1):
+            noise = ALIKE * hypot(told.noise, told.doubt, told.before)
+            drive.correct(1, told.zoom, wrong - told.beside, noise)
 
 
 @dataclass(frozen=True)
@@ -145,7 +154,8 @@ class _Told:
     """What the end of a chain tells of a law: how that changes with the law's numbers, and its noise.
 
     `doubt`: that of the law; `share`: how much of where the first hop began is left in it; `before`: what doubt of
-    that is; `beside`: how far from what was believed the law would have ended.
+    that is; `beside`: how far from what was believed the law would have ended. `zoom`: how it changes with zoom's
+    rate, and `zoomed`: what the doubt about where zoom was then makes of it.
     """
 
     slope: Vector
@@ -154,6 +164,8 @@ class _Told:
     share: float
     before: float
     beside: float
+    zoom: float
+    zoomed: float
 
     def off(self, wrong: float) -> float:
         """How far off the law, where what was believed was wrong by so much; degrees that no doubt explains."""
@@ -162,6 +174,7 @@ class _Told:
 
 def _told(planes: Planes, axis: int, hops: Sequence[Hop], read: float) -> _Told:
     slope, noise, share, counts, beside = np.zeros_like(planes.mean), read, 1.0, 1.0, 0.0
+    zoom = zoomed = 0.0
     for hop in reversed(hops):
         share = counts
         way = planes.angle(axis, hop.parts[axis], hop.begun[ZOOM])
@@ -170,7 +183,9 @@ def _told(planes: Planes, axis: int, hops: Sequence[Hop], read: float) -> _Told:
         slope += bends * planes.weights(axis, hop.begun[ZOOM])
         noise = hypot(noise, share * TIME_S * hop.speeds[axis])
         if hop.speeds[ZOOM]:
-            noise = hypot(noise, bends * LEVELS * planes.growth(hop.begun[ZOOM]))
+            grows = bends * planes.growth(hop.begun[ZOOM])
+            noise = hypot(noise, LEVELS * grows)
+            zoom, zoomed = zoom - hop.zoomed * grows, zoomed + hop.unsure * grows
         counts *= max(0.0, 1.0 - abs(hop.speeds[axis]) / hop.tops[axis])  # in full flight it matters not where to
     before = 0.0 if hops[0].turned is None else ALIKE * share * hops[0].turned[axis].doubt
-    return _Told(slope, planes.doubt(slope), noise, share, before, beside)
+    return _Told(slope, planes.doubt(slope), noise, share, before, beside, zoom, abs(zoomed))

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from math import hypot
 from statistics import median
 from typing import Literal
 
-from services.camera.ptz.pace import PAN_RATES, READ_LATE, TILT_RATES, ZOOM_RATES, Pace
+from services.camera.ptz.pace import HALF_CHANGE, PAN_RATES, READ_LATE, TILT_RATES, ZOOM_RATES, Pace
 from services.camera.ptz.planes import POINT, TURN, VIEW, Scale, scale_of
 from services.camera.requests import Reply
 
@@ -29,6 +30,10 @@ DITHER_DEG = 0.1  # a reading at rest may be so far off where they dither
 STILL_DEG = 0.05
 STEADY = 6  # readings at rest that were alike show that they do not dither
 LEVEL = 1.0  # zoom is read in coarse steps: a reading may be so far from the truth
+ZOOM_SLOWS_S = 0.1  # zoom takes so long to its speed, and to rest
+ZOOM_DOUBT = 0.1  # of DRIVES' zoom, at first
+OTHER_PART = 0.06  # of the top speed: the firmware's own moves may be as much faster, or slower
+STEP_LONGER = 1.5  # than is reckoned
 GRIDS = (2.0, 1.0)  # some firmware tells zoom in coarse steps
 
 
@@ -38,6 +43,20 @@ def _scales() -> dict[RelativeForm, Scale]:
     moveRelatively is taken for the like of moveAbsolutely, whose share of 1 is half a turn; Position for the picture's.
     """
     return {"moveRelatively": scale_of(TURN, VIEW, POINT), "Position": scale_of(POINT, VIEW, TURN)}
+
+
+def _zoom() -> Pace:
+    """Coarse readings hardly teach how long zoom takes to be as fast as ever, so it is guessed for the rate."""
+    pace = Pace(ZOOM_RATES)
+    pace.mean[len(ZOOM_RATES) + HALF_CHANGE] = ZOOM_SLOWS_S / (2 * ZOOM_RATES[0])
+    return pace
+
+
+def _drives() -> tuple[Pace, Pace, Pace]:
+    """Zoom is seen on its way only where it is slower than is thought: a guess that is little doubted is best there."""
+    pan, tilt, zoom = (Pace((top,)) for top in DRIVES)
+    zoom.suppose(DRIVES[2], ZOOM_DOUBT, ZOOM_SLOWS_S / (2 * DRIVES[2]))
+    return pan, tilt, zoom
 
 
 @dataclass
@@ -84,9 +103,7 @@ class Timing:
 class Skill:
     """What is learnt about one camera. `zoomed` is where zoom truly is, as far as its coarse reading leaves open."""
 
-    paces: tuple[Pace, Pace, Pace] = field(
-        default_factory=lambda: (Pace(PAN_RATES), Pace(TILT_RATES), Pace(ZOOM_RATES))
-    )
+    paces: tuple[Pace, Pace, Pace] = field(default_factory=lambda: (Pace(PAN_RATES), Pace(TILT_RATES), _zoom()))
     senses: tuple[Sense, Sense, Sense] = field(default_factory=lambda: (Sense(), Sense(), Sense(sure=True)))
     timing: Timing = field(default_factory=Timing)
     picture: tuple[bool, bool] = (False, False)  # flip and mirror, with which the senses were seen
@@ -98,7 +115,7 @@ class Skill:
     says_late: bool = False  # and when its position was the last one already: what it says is no newer than that
     zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
-    drives: tuple[Pace, Pace, Pace] = field(default_factory=lambda: tuple(Pace((top,)) for top in DRIVES))  # type: ignore[assignment]
+    drives: tuple[Pace, Pace, Pace] = field(default_factory=_drives)
     arrives_late: float = 0.02  # s after it is reckoned there, to look whether a drive has ended
     honours: dict[str, Honours] = field(default_factory=dict)  # by form
     beside: dict[str, tuple[float, float]] = field(default_factory=dict)  # by form: pan and tilt off what was asked
@@ -123,6 +140,20 @@ class Skill:
         for form, takes in (("moveAbsolutely", absolute), ("moveRelatively", relative)):
             if takes is False:
                 self.honours.setdefault(form, "no")
+
+    def drive(self, axis: int) -> Pace:
+        """How fast the firmware drives by itself: as after a start at top speed, until something better is known."""
+        own, told = self.drives[axis], self.paces[axis]
+        top = told.speeds[-1]
+        part = hypot(told.doubt(top) / told.rate(top), OTHER_PART)
+        if part < own.doubt(1) / own.rate(1):
+            own.suppose(told.rate(top), part, told.other(HALF_CHANGE))
+        return own
+
+    @property
+    def step_s(self) -> float:
+        """How long zoom may turn on its own and be read the same, in coarse steps."""
+        return STEP_LONGER * (self.zoom_grid or GRIDS[0]) / self.drive(2).rate(1)
 
     @property
     def read_late(self) -> float:

@@ -31,7 +31,6 @@ ENOUGH_DEG = 0.4  # doubt about the place of an end that needs no look
 PROBE_S = 0.35  # seen in the readings
 PROBE_LONG_S = 1.5  # shows how fast it is, too, and is harmless the wrong way
 FASTER = 2.0  # than is guessed, it may be
-MOVED_DEG = 0.3
 PROBE_LOOKS = 3
 LOOKS = 1  # readings in a leg
 MOST_LOOKS = 15
@@ -237,7 +236,7 @@ class Turning:
 
     def _probe(self, axes: list[int]) -> Plan[float]:
         """Turns slowly to see which way that is; it goes on turning, unless a stop may be near."""
-        levels = [0, 0, 0]
+        levels, senses = [0, 0, 0], self.helm.skill.senses
         for axis in axes if self.helm.skill.diagonals else axes[:1]:
             levels[axis] = 1 if self.helm.aim[axis] > self.helm.course.origin[axis] else -1
         turning = [axis for axis in (PAN, TILT) if levels[axis]]
@@ -245,15 +244,15 @@ class Turning:
         for look in range(PROBE_LOOKS):
             now = yield from wait(now + (PROBE_S if look else self._probes_for(turning)))
             reply = yield from self.helm.send(Status())
-            now, reading = reply.received, cast(Reading, reply.result)
-            if self._see_senses(reading, levels) or not any(self.helm.course.levels):
+            now = reply.received
+            self.helm.course.read(reply, cast(Reading, reply.result))
+            if all(senses[axis].sure for axis in turning) or not any(self.helm.course.levels):
                 break
             if now + PROBE_S > begun + min(map(self._alone, turning)):
                 now = yield from self.helm.stop(now)
         for axis in turning:
-            if not self.helm.skill.senses[axis].sure:  # an end stop may be in its way
+            if not senses[axis].sure:  # an end stop may be in its way
                 self.helm.course.flip(axis)
-        self.helm.course.read(reply, reading)
         return now
 
     def _probes_for(self, axes: list[int]) -> float:
@@ -270,19 +269,3 @@ class Turning:
         here, (low, high) = self.helm.course.origin[axis], self.helm.limits.ranges[axis]
         timing, rate = self.helm.skill.timing, FASTER * self.helm.skill.paces[axis].guess[0]
         return min(high - here, here - low) / rate - 2 * timing.usual - timing.tail
-
-    def _see_senses(self, reading: Reading, levels: list[int]) -> bool:
-        """Whether every axis that was probed has shown which way it goes."""
-        pose, seen = self.helm.limits.pose(reading), True
-        for axis in (PAN, TILT):
-            moved = pose[axis] - self.helm.course.origin[axis]
-            sense = self.helm.skill.senses[axis]
-            if not levels[axis] or sense.sure:
-                continue
-            if abs(moved) < MOVED_DEG:
-                seen = False
-                continue
-            sense.sure = True
-            if moved * levels[axis] < 0:
-                self.helm.course.flip(axis)
-        return seen

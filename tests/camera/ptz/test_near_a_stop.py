@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from services.simulators.camera.latency import TAIL
 from tests.camera.goals import Goal, Outcome, Rig, random_goals
 
 PROFILE = PROFILES["ip3m-943b"]
+PUNCTUAL = replace(PROFILE, latency_tail=0.0)  # none comes late but those that a test makes late
 AWAY = (20.0, 40.0, 4.0)
 
 
@@ -38,9 +40,9 @@ class Unlucky(Rig):
             self.device.latency.control = usual
 
 
-@pytest.mark.parametrize("tilt", range(86, 108, 2))
+@pytest.mark.parametrize("tilt", range(86, 108))
 def test_a_look_and_what_follows_it_may_both_come_late(tilt: int) -> None:
-    rig = Unlucky(PROFILE, 8)
+    rig = Unlucky(PUNCTUAL, 8)
     rig.calibrate()
     for goal in random_goals(8, 8):
         rig.go(goal)

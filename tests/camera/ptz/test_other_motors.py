@@ -1,0 +1,53 @@
+"""Every firmware in cameras that nobody has seen: no figure of the simulator's own motors is taken for granted."""
+
+from __future__ import annotations
+
+import pytest
+
+from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.simulators.camera.firmwares import PROFILES
+from tests import bounds
+from tests.camera.goals import Outcome, Rig, outcomes, random_goals, with_other_motors
+
+CAMERAS = range(1, 7)
+GOALS = 25
+PUSHED = 1  # two late answers in a row do that to one in some thousands
+WITHIN_COMMANDS = 0.97
+RATE, ZOOM_RATE = 0.05, 0.12  # of the truth, off it after calibrating; zoom is read in coarse steps
+SLOW_DEG_S = 0.1  # readings are a tenth of a degree off, and a leg takes 1.5 s
+
+
+@pytest.fixture(scope="module", params=sorted(PROFILES))
+def moved(request: pytest.FixtureRequest) -> list[Outcome]:
+    """Goals of every one of those cameras, calibrated."""
+    return [
+        one
+        for camera in CAMERAS
+        for one in outcomes(
+            with_other_motors(PROFILES[request.param], camera), random_goals(GOALS, camera), camera, calibrated=True
+        )
+    ]
+
+
+def test_every_goal_is_reached_and_the_camera_rests_when_done_is_said(moved: list[Outcome]) -> None:
+    assert [one for one in moved if one.error or one.off > bounds.OFF_DEG or not one.rests] == []
+    assert sum(one.pushed > 0 for one in moved) <= PUSHED
+
+
+def test_a_goal_takes_few_commands(moved: list[Outcome]) -> None:
+    few = [one.commands <= bounds.COMMANDS for one in moved]
+    assert sum(few) >= WITHIN_COMMANDS * len(few)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("name", sorted(PROFILES))
+def test_calibrating_learns_every_speed_of_every_axis(name: str, camera: int) -> None:
+    profile = with_other_motors(PROFILES[name], camera)
+    rig = Rig(profile, camera)
+    rig.calibrate()
+    for axis, share in ((PAN, 1.0), (TILT, profile.tilt_share)):
+        pace = rig.skill.paces[axis]
+        for speed, rate in enumerate(profile.pan_speeds, 1):
+            assert pace.rate(speed) == pytest.approx(rate * share, rel=RATE, abs=SLOW_DEG_S)
+    assert rig.skill.paces[ZOOM].rate(1) == pytest.approx(profile.zoom_speed, rel=ZOOM_RATE)
+    assert rig.skill.drive(ZOOM).rate(1) == pytest.approx(profile.zoom_speed, rel=ZOOM_RATE)
