@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, sqrt
-from typing import Literal, cast
+from math import sqrt
+from typing import Literal
 
-from services.camera.ptz.course import GRID, PAN, TILT, ZOOM
+from services.camera.ptz import zoom_drive
+from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told
-from services.camera.ptz.skill import ZOOM_SLOWS_S, Skill
-from services.camera.requests import GotoPreset, MoveTo, Reading, Reply
+from services.camera.ptz.skill import Skill
+from services.camera.requests import GotoPreset, MoveTo, Reply
 
 ABSOLUTE: tuple[Literal["PositionABS", "moveAbsolutely"], ...] = ("PositionABS", "moveAbsolutely")
 PRESET_DEG = 2.0  # a preset as near to the goal as that is worth going to
@@ -26,8 +27,6 @@ BESIDE_DEG = 6.0  # farther from what was asked for, it was not honoured
 LEAST_DEG = 0.3
 ZOOM_LATE_S = 0.04  # it may still slow down when its coarse reading is the last one
 NOISE_DEG, NOISE_S = 0.2, 0.03  # of a reading on the way
-SLOWEST = 2.0  # standard deviations that zoom may be slower than is known
-NOISE_LEVELS = 0.5  # of where zoom was on its way, at the edge of a step of its reading
 WITHIN_DEG = 0.1  # what is asked for stays so far from an end stop
 
 
@@ -47,10 +46,9 @@ class Begun:
     here: Pose
     reply: Reply
 
-    @property
-    def zooms(self) -> bool:
-        """Whether zoom is on its way, too."""
-        return self.here[ZOOM] != self.drive.to[ZOOM]
+    def zooming(self, skill: Skill) -> Glide:
+        """The way of zoom."""
+        return zoom_drive.begin(skill, self.here[ZOOM], self.drive.to[ZOOM], self.reply.received)
 
     def arrives(self, skill: Skill) -> float:
         """When it should be there, as far as is known by now."""
@@ -59,7 +57,7 @@ class Begun:
     def look(self, skill: Skill, reply: Reply, seen: Pose) -> None:
         """What a look on the way, or at its end, tells of its speed; `seen`: its reading as a pose."""
         learn_on_the_way(skill, self.here, self.drive, self.reply, reply, seen)
-        see_zoom(skill, zooming(skill, self.here[ZOOM], self.drive.to[ZOOM], self.reply.received), reply)
+        zoom_drive.see(skill, self.zooming(skill), reply)
 
 
 def find(
@@ -123,36 +121,6 @@ def learn_on_the_way(skill: Skill, here: Pose, drive: Drive, begun: Reply, reply
             told = [Told(begun.received, timing.late(begun), 1)]
             pace.learn(told, Seen(reply.sent, timing.late(reply), travel, NOISE_DEG + NOISE_S * pace.rate(1)))
             pace.age()
-
-
-def zooming(skill: Skill, here: float, to: float, acted: float) -> Glide:
-    """The way of zoom from rest, levels; `acted`: when it begins."""
-    top = skill.drive(ZOOM).rate(1)
-    return Glide(acted, here, 0.0, to, top, top / ZOOM_SLOWS_S, acted)
-
-
-def zoomed_by(skill: Skill, glide: Glide) -> float:
-    """When zoom rests, on its way from rest, at the latest; as far as its speed is known by now."""
-    pace, way = skill.drive(ZOOM), abs(glide.goal - glide.place)
-    slowest = max(pace.rate(1) / 2, pace.rate(1) - SLOWEST * pace.doubt(1))
-    return glide.began + (way / slowest + ZOOM_SLOWS_S if way else 0.0)
-
-
-def see_zoom(skill: Skill, glide: Glide, reply: Reply) -> None:
-    """What a look shows of zoom on its way from rest: its speed, or where it has arrived, that it is no slower."""
-    pace, timing, way = skill.drive(ZOOM), skill.timing, abs(glide.goal - glide.place)
-    seen = abs(cast(Reading, reply.result).zoom - glide.place)
-    half = (skill.zoom_grid or GRID) / 2
-    if way <= half or glide.began >= reply.sent:
-        return
-    pace.borrow(skill.paces[PAN])
-    told = [Told(glide.began, 0.0, 1)]
-    low, high = seen - half, inf if seen > way - half - NOISE_LEVELS else seen + half
-    shown = Seen(reply.sent, timing.late(reply), seen, NOISE_LEVELS)
-    expected, _ = pace.expected(told, shown)
-    if not low <= expected <= high:
-        pace.learn(told, shown._replace(travel=min(high, max(low, expected))))
-        pace.age()
 
 
 def judge(skill: Skill, here: Pose, drive: Drive, there: Pose) -> None:

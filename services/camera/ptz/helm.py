@@ -8,6 +8,7 @@ from typing import cast
 
 from services.camera.device import same
 from services.camera.plan import Plan, ask, wait
+from services.camera.ptz import zoom_drive
 from services.camera.ptz.course import PAN, TILT, ZOOM, Course
 from services.camera.ptz.drive import Begun
 from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
@@ -128,12 +129,14 @@ class Helm:
             before = seen
             reply, seen, reading = yield from self._look()
             since = since if same(before, seen) else reply.sent
-            if reply.sent - since >= self._pair() and self.zoom_ends is None:
+            if self._still(reply.sent, since) and self.zoom_ends is None:
                 self.skill.always_moving = seen.moving is True
                 reading = seen
                 break
         self.foretold = reading is not seen
-        rests = 0.0 if seen.moving is False else self._rests() + self._unsure(0.0) + RESTS_S
+        rests = 0.0 if self.skill.tells_rest(seen.moving) else self._rests() + self._unsure(0.0) + RESTS_S
+        if rests and self.driven is not None:
+            rests = max(rests, zoom_drive.rests(self.skill, self.driven.zooming(self.skill)))
         if self.zoom_ends is not None:
             self.time_zoom(reply.received)
         self._place_zoom(reading)
@@ -145,9 +148,10 @@ class Helm:
         """When it comes to rest, as far as is known by now."""
         return max(self.quiet, self.course.rests_at())
 
-    def _pair(self) -> float:
-        """Over how many seconds readings have to be equal to show a camera at rest."""
-        return max(PAIR_S, self.skill.step_s) if self.driven is not None and self.driven.zooms else PAIR_S
+    def _still(self, sent: float, since: float) -> bool:
+        """Whether readings that are the same since some time show a camera at rest, its zoom included."""
+        zoom = self.driven.zooming(self.skill) if self.driven is not None else None
+        return sent >= since + PAIR_S and (zoom is None or zoom_drive.shown(self.skill, zoom, sent, since))
 
     def _look(self) -> Plan[tuple[Reply, Reading, Reading | None]]:
         """A look where it should rest: the answer, its reading, and that of the rest; None: not known by this one."""

@@ -15,10 +15,9 @@ from math import copysign
 from typing import cast
 
 from services.camera.plan import Plan, wait
-from services.camera.ptz import drive as own
-from services.camera.ptz import landing, scale
+from services.camera.ptz import landing, scale, zoom_drive
+from services.camera.ptz.arriving import Arriving
 from services.camera.ptz.course import PAN, TILT, ZOOM
-from services.camera.ptz.driving import at_rest
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import RESTS_S, Helm
@@ -97,9 +96,8 @@ class Hopping:
         arrives = max(self._ends(), zoom.ends)
         self.helm.rests = arrives
         about = 0.0 if self._exact(to) else ABOUT_DEG
-        reading, now, _ = yield from at_rest(
-            self.helm, arrives, to, now, self.zooming, certain=certain, about=about, hops=True
-        )
+        end = Arriving(self.helm, to, self.zooming, certain, about, hops=True)
+        reading, now, _ = yield from end.at_rest(arrives, now)
         if certain and self._timely:
             known = landing.doubts(self.helm.skill, self.form, self.hops, self.foretold)
             rest = [landing.read(*one) for one in zip(self.helm.limits.pose(reading), known, strict=False)]
@@ -125,7 +123,7 @@ class Hopping:
             yield from wait(max(now, look))
             reply = yield from helm.send(Status())
             reading, now = cast(Reading, reply.result), reply.received
-            own.see_zoom(helm.skill, self.zooming, reply)
+            zoom_drive.see(helm.skill, self.zooming, reply)
             arrives = max(self._ends(), self.glides[ZOOM].ends)
             ends = landing.ends(helm.skill, self.glides, doubts, reply, helm.limits.pose(reading))
             landing.stray(self._scale, self.glides, doubts, ends)
@@ -138,7 +136,9 @@ class Hopping:
             helm.stand(reading)
             helm.rests = arrives
             if verdict == "there" or helm.left < FEW or not helm.beside(helm.limits.pose(reading)):
-                return reading, (yield from wait(max(now, arrives + RESTS_S, own.zoomed_by(helm.skill, self.zooming))))
+                return reading, (
+                    yield from wait(max(now, arrives + RESTS_S, zoom_drive.rests(helm.skill, self.zooming)))
+                )
             began = min(arrives, now)
             for axis, end in enumerate(ends):
                 self.glides[axis] = replace(self.glides[axis], began=began, place=end.at, speed=0.0, goal=end.at)

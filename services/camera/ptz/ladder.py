@@ -24,10 +24,7 @@ MISSING = 3  # commands that may be missing
 PRICE_S = 0.08  # of a command, while there are enough
 MISS = 3.0  # answers: a miss is put right from rest, and so much later
 DOUBTED, FEARED = 0.5, 2.0  # of the doubt about a rate: what counts usually, and where a stop is near
-AGAIN, FEAR = (
-    0.35,
-    1.1,
-)  # parts of how late an answer may be: the second answer in a row that is late; and the one that is an end
+AGAIN, FEAR = 0.5, 1.1  # parts of how late an answer may be: a second one in a row; and the one that is an end
 NEVER_S = 60.0
 
 Values = NDArray[np.float64]

@@ -42,8 +42,9 @@ def rush(helm: Helm, reaches: tuple[float, float], now: float, *, zooms: bool) -
     for early in (True, False):  # once soon, as long as the speed is not known, and once before the end
         ends = helm.course.end_for(lead, end, now)
         unsure = helm.course.doubt(lead, ends) / rates[lead]
-        look = ends - 2 * timing.usual - min(timing.tail, LATE_LOOK * timing.usual) - unsure
-        if look < now or (early and pace.known(level)):
+        latest = ends - 2 * timing.usual - min(timing.tail, LATE_LOOK * timing.usual)
+        look = max(now, latest - unsure)
+        if latest < now or (early and pace.known(level)):
             continue
         yield from wait(min(look, now + timing.usual) if early else look)
         reply = yield from helm.send(Status())

@@ -10,7 +10,7 @@ import numpy as np
 
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import EDGE_DEG, Limits, Pose
-from services.camera.ptz.pace import HALF_CHANGE, Seen, Told, Vector
+from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told, Vector
 from services.camera.ptz.planes import Planes, Scale
 from services.camera.ptz.skill import LEVEL, RelativeForm, Skill
 from services.camera.requests import Reading
@@ -22,6 +22,7 @@ READ_DEG, TIME_S = 0.08, 0.003  # of a reading; when a hop took effect
 LEVELS = 0.5  # where zoom is while it turns, beside the doubt of its rate
 ZOOMED = 0.4  # of the doubt about where zoom was, for what a hop tells of the scale
 KNOWN = 0.08  # of zoom's rate: as well known as that, it is told more exactly by where hops led
+ROUGHLY = 0.2  # of a rate
 SHARE = 0.8  # of the way that the first hop of a chain went; less tells little of the motor before it
 TIMED = 0.5  # of the time that an axis takes to slow down: with less doubt it is known when it rests
 ALIKE = 2.0  # what each of two takes from one reading, the other took too: so often more doubt is left to both
@@ -138,15 +139,22 @@ def _learn(skill: Skill, form: RelativeForm, axis: int, hops: Sequence[Hop], wro
         planes.age()
         told = _told(planes, axis, hops, read)
         planes.learn(told.slope, wrong - told.beside, hypot(told.noise, told.before, ZOOMED * told.zoomed))
-        if planes is believed and turned is not None and turned[axis].told and told.share > SHARE:
+        pace = skill.paces[axis]
+        if planes is believed and turned is not None and told.share > SHARE and _roughly(pace, turned[axis].told):
             travel = hops[0].begun[axis] + wrong / told.share - turned[axis].origin
             noise = ALIKE * hypot(told.noise, told.doubt, told.zoomed) / told.share
             seen = Seen(turned[axis].answered, turned[axis].late, travel, noise, acts=True)
-            skill.paces[axis].learn(turned[axis].told, seen)
+            pace.learn(turned[axis].told, seen)
         drive = skill.drive(ZOOM)
         if planes is believed and told.zoom and drive.doubt(1) < KNOWN * drive.rate(1):
             noise = ALIKE * hypot(told.noise, told.doubt, told.before)
             drive.correct(1, told.zoom, wrong - told.beside, noise)
+
+
+def _roughly(pace: Pace, told: Sequence[Told]) -> bool:
+    """Whether it was told to turn, with speeds that are known roughly: more is not learnt of them by where hops led."""
+    speeds = {abs(one.level) for one in told if one.level}
+    return bool(speeds) and all(pace.doubt(speed) < ROUGHLY * pace.rate(speed) for speed in speeds)
 
 
 @dataclass(frozen=True)

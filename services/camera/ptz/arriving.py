@@ -1,0 +1,120 @@
+"""The end of what the firmware drives by itself: looks until it rests, as good as, and when that surely is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import sqrt
+from typing import cast
+
+from services.camera.device import same
+from services.camera.plan import Plan, wait
+from services.camera.ptz import zoom_drive
+from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.glide import Glide
+from services.camera.ptz.goal import Pose
+from services.camera.ptz.helm import FOREVER, PAIR_S, Helm
+from services.camera.ptz.pace import HALF_CHANGE, READ_LATE
+from services.camera.ptz.skill import NEARER_DEG, Skill
+from services.camera.requests import Reading, Reply, Status
+
+LOOKS = 30  # less and less often
+LONG_S = 2.0  # apart, at most
+THERE_DEG = 0.15  # what is farther off is on its last bit of way
+NEWER, NEWEST_S = 2.0, 0.1  # standard deviations that a reading may be newer than is known, and at most
+READ_DEG, LONGER = 0.1, 1.3  # of a reading; than is reckoned an axis may take to slow down
+
+
+@dataclass
+class Arriving:
+    """One such end. `to`: where it leads; `zooming`: the way of zoom; `certain`: it is known exactly where that leads.
+
+    `about`: that is not known quite exactly, but so few degrees; there one look is enough if it tells of rest. `hops`:
+    it may be beyond its end and return, so it is not there while it says that it moves.
+    """
+
+    helm: Helm
+    to: Pose
+    zooming: Glide
+    certain: bool
+    about: float = 0.0
+    hops: bool = False
+    seen: list[Reading] = field(default_factory=list)
+    since: float = FOREVER  # the latest reading is the same since then
+
+    def at_rest(self, arrives: float, now: float) -> Plan[tuple[Reading, float, bool]]:
+        """Looks from about then on.
+
+        Returns the reading, when it rests, and whether that surely shows the camera at rest.
+        """
+        skill = self.helm.skill
+        yield from wait(max(now, arrives - skill.read_late + skill.arrives_late))
+        for _ in range(LOOKS):
+            reply = yield from self._look()
+            if self._there or self._beside or self._still(reply.sent):
+                break
+            yield from wait(reply.sent + min(LONG_S, PAIR_S * (len(self.seen) - 1)))
+        if self.certain and (self._there or not same(self.seen[0], self.seen[-1])):
+            skill.expect_arrival(there=len(self.seen) == 1 and self._off <= max(THERE_DEG, self.about))
+        still = self._still(reply.sent)
+        if still or skill.tells_rest(self.seen[-1].moving):
+            return self.seen[-1], reply.received, self._rests or still
+        return self.seen[-1], (yield from wait(max(reply.received, self._rested(reply)))), self._rests
+
+    def _look(self) -> Plan[Reply]:
+        reply = yield from self.helm.send(Status())
+        self.seen.append(cast(Reading, reply.result))
+        again = len(self.seen) > 1 and same(self.seen[-2], self.seen[-1])
+        self.since = self.since if again else reply.sent
+        self.helm.skill.says_late |= again and self.seen[-2].moving is True
+        zoom_drive.see(self.helm.skill, self.zooming, reply)
+        return reply
+
+    @property
+    def _off(self) -> float:
+        """How far pan and tilt are from where they should be, degrees."""
+        pose = self.helm.limits.pose(self.seen[-1])
+        return max(abs(pose[axis] - self.to[axis]) for axis in (PAN, TILT))
+
+    @property
+    def _rests(self) -> bool:
+        """Whether the camera tells by itself that this is its last position."""
+        return self.helm.skill.tells_end(self.seen[-1].moving)
+
+    def _zoomed(self, reading: Reading) -> bool:
+        return abs(reading.zoom - self.to[ZOOM]) <= self.helm.zoom_near
+
+    @property
+    def _there(self) -> bool:
+        goes = self.hops and self.seen[-1].moving is True and not self.helm.skill.always_moving
+        near = self.certain and self._off <= NEARER_DEG and self._zoomed(self.seen[-1])
+        return near and (self._rests or not (self.about or goes))
+
+    @property
+    def _beside(self) -> bool:
+        """Whether it rests where it should, and the goal is elsewhere."""
+        beside = self.helm.beside(self.helm.limits.pose(self.seen[-1]))
+        return beside and self._off <= self.about and self._rests
+
+    def _still(self, sent: float) -> bool:
+        """Whether readings that are the same show that it rests, with its zoom."""
+        skill = self.helm.skill
+        tells = skill.tells_rest(self.seen[-1].moving)
+        return sent >= self.since + PAIR_S and (tells or zoom_drive.shown(skill, self.zooming, sent, self.since))
+
+    def _rested(self, reply: Reply) -> float:
+        """When all rests, at the latest, that was seen on its last bit of way."""
+        skill = self.helm.skill
+        if all(map(self._zoomed, self.seen)):
+            zoom = zoom_drive.rests(skill, self.zooming)
+        else:
+            zoom = zoom_drive.rests_late(skill, self.zooming, reply.sent)
+        return max(zoom, rests_by(skill, self._off, reply))
+
+
+def rests_by(skill: Skill, off: float, reply: Reply) -> float:
+    """When pan and tilt rest that were seen slowing down so many degrees before their goals; at the latest."""
+    reads = skill.paces[PAN]
+    newer = min(NEWEST_S, NEWER * reads.other_doubt(READ_LATE))
+    seen = reads.seen_at(reply.sent, skill.timing.late(reply)) + newer
+    half = max(pace.other(HALF_CHANGE) for axis in (PAN, TILT) for pace in (skill.drive(axis), skill.paces[axis]))
+    return min(seen, reply.received) + LONGER * sqrt(4 * half * (READ_DEG + off))

@@ -1,0 +1,62 @@
+"""Zoom that the firmware drives by itself: its way from rest, what looks show of that, and when it rests.
+
+It is read in coarse steps: a reading tells of it at the edge of a step only, and hardly of its speed. Pure.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import cast
+
+from services.camera.ptz.course import GRID, PAN, ZOOM
+from services.camera.ptz.glide import Glide
+from services.camera.ptz.pace import Seen, Told
+from services.camera.ptz.skill import ZOOM_SLOWS_S, Skill
+from services.camera.requests import Reading, Reply
+
+SLOWEST = 2.0  # standard deviations that it may be slower than is known
+NOISE_LEVELS = 0.5  # of where it was on its way, at the edge of a step of its reading
+
+
+def begin(skill: Skill, here: float, to: float, acted: float) -> Glide:
+    """Its way from rest, levels; `acted`: when that begins."""
+    top = skill.drive(ZOOM).rate(1)
+    return Glide(acted, here, 0.0, to, top, top / ZOOM_SLOWS_S, acted)
+
+
+def see(skill: Skill, glide: Glide, reply: Reply) -> None:
+    """What a look shows of it on its way from rest: its speed, or where it has arrived, that it is no slower."""
+    pace, timing, way = skill.drive(ZOOM), skill.timing, abs(glide.goal - glide.place)
+    seen = abs(cast(Reading, reply.result).zoom - glide.place)
+    half = (skill.zoom_grid or GRID) / 2
+    if way <= half or glide.began >= reply.sent:
+        return
+    pace.borrow(skill.paces[PAN])
+    told = [Told(glide.began, 0.0, 1)]
+    low, high = seen - half, inf if seen > way - half - NOISE_LEVELS else seen + half
+    shown = Seen(reply.sent, timing.late(reply), seen, NOISE_LEVELS)
+    expected, _ = pace.expected(told, shown)
+    if not low <= expected <= high:
+        pace.learn(told, shown._replace(travel=min(high, max(low, expected))))
+        pace.age()
+
+
+def rests(skill: Skill, glide: Glide) -> float:
+    """When it rests at the latest, as far as its speed is known by now."""
+    pace, way = skill.drive(ZOOM), abs(glide.goal - glide.place)
+    slowest = max(pace.rate(1) / 2, pace.rate(1) - SLOWEST * pace.doubt(1))
+    return glide.began + (way / slowest + ZOOM_SLOWS_S if way else 0.0)
+
+
+def rests_late(skill: Skill, glide: Glide, seen: float) -> float:
+    """The same where it was slower than is known: it is read to be there, and was not in the look before that.
+
+    It was seen as soon as it was nearer than half a step: that takes as long in proportion as the way before it.
+    """
+    way, half = abs(glide.goal - glide.place), (skill.zoom_grid or GRID) / 2
+    return seen + (seen - glide.began) * half / max(half, way - half) + ZOOM_SLOWS_S
+
+
+def shown(skill: Skill, glide: Glide, sent: float, since: float) -> bool:
+    """Whether it rests too where all is read the same since some time; coarse readings alone show that late."""
+    return sent >= min(rests(skill, glide), since + skill.step_s)
