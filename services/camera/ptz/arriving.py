@@ -38,8 +38,8 @@ class Arriving:
     certain: bool
     about: float = 0.0
     hops: bool = False
-    seen: list[Reading] = field(default_factory=list)
-    since: float = FOREVER  # the latest reading is the same since then
+    seen: list[Reading] = field(default_factory=list, init=False)
+    since: float = field(default=FOREVER, init=False)  # the latest reading is the same since then
 
     def at_rest(self, arrives: float, now: float) -> Plan[tuple[Reading, float, bool]]:
         """Looks from about then on.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from services.camera.plan import Plan, wait
-from services.camera.ptz.course import END, GRID, PAN, TILT, ZOOM
+from services.camera.ptz.course import END, PAN, TILT, ZOOM
 from services.camera.ptz.goal import Goal, Limits
 from services.camera.ptz.helm import Helm, levels_of
 from services.camera.ptz.move import Arrival, goto
@@ -108,7 +108,7 @@ def _zoom(limits: Limits, skill: Skill, now: float) -> Plan[float]:
         reading, now = yield from settle()
         helm = Helm(Goal(limits.pose(reading)), limits, skill)
         helm.stand(reading)
-        end, grid = limits.zoom[level > 0], skill.zoom_grid or GRID
+        end, grid = limits.zoom[level > 0], skill.zoom_step
         now = (yield from helm.start((0, 0, level))).received
         for _ in range(LOOKS):
             reply = yield from helm.send(Status())

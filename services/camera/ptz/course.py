@@ -13,7 +13,6 @@ from services.camera.requests import Reading, Reply
 PAN, TILT, ZOOM = range(3)
 END = 0.15  # degrees or levels: as near as that to an end of its range, an axis may have been stopped by it
 READ_DEG = 0.08  # the resolution, and a little dither
-GRID = 2.0  # levels: the steps in which zoom may be told, while that is not known
 COARSE = 0.3  # of a step of its reading: standard deviation
 MOVED_DEG = 0.3  # no reading at rest changes as much
 CLEAR_DEG = 2.0  # so far the wrong way is not a doubtful reading
@@ -106,7 +105,7 @@ class Course:
         speed = abs(pace.velocity(told, seen_at))
         changes = [abs(one.level) for one in told]
         timing = TIME_S * max((pace.rate(level) for level in changes if level), default=0.0)
-        noise = READ_DEG + (COARSE * (self.skill.zoom_grid or GRID) if axis == ZOOM else 0.0)
+        noise = READ_DEG + (COARSE * self.skill.zoom_step if axis == ZOOM else 0.0)
         seen = Seen(reply.sent, late, value - self.origin[axis], (noise**2 + (TIME_S * speed) ** 2 + timing**2) ** 0.5)
         inside = low + END < value < high - END
         farther = abs(seen.travel) > abs(pace.expected(told, seen)[0])

@@ -55,8 +55,16 @@ class Begun:
         return self.reply.received + longest(skill, self.here, self.drive.to)
 
     def look(self, skill: Skill, reply: Reply, seen: Pose) -> None:
-        """What a look on the way, or at its end, tells of its speed; `seen`: its reading as a pose."""
-        learn_on_the_way(skill, self.here, self.drive, self.reply, reply, seen)
+        """What a look tells of its speed, on the axes that do not slow down yet; `seen`: its reading as a pose."""
+        timing = skill.timing
+        for axis in (PAN, TILT):
+            pace, way = skill.drive(axis), self.drive.to[axis] - self.here[axis]
+            travel = (seen[axis] - self.here[axis]) * (1 if way > 0 else -1)
+            braking = pace.other(HALF_CHANGE) * pace.rate(1) ** 2
+            if LEAST_DEG < travel < abs(way) - 1.5 * braking - 3.0:
+                told = [Told(self.reply.received, timing.late(self.reply), 1)]
+                pace.learn(told, Seen(reply.sent, timing.late(reply), travel, NOISE_DEG + NOISE_S * pace.rate(1)))
+                pace.age()
         zoom_drive.see(skill, self.zooming(skill), reply)
 
 
@@ -108,19 +116,6 @@ def longest(skill: Skill, here: Pose, there: Pose) -> float:
     ways = (abs(b - a) for a, b in zip(here, there, strict=True))
     pan, tilt, zoom = (seconds(skill.drive(axis), way) for axis, way in enumerate(ways))
     return max(pan, tilt, zoom + ZOOM_LATE_S if zoom else 0.0)
-
-
-def learn_on_the_way(skill: Skill, here: Pose, drive: Drive, begun: Reply, reply: Reply, seen: Pose) -> None:
-    """A reading while it drives tells its speed, on the axes that do not slow down yet."""
-    timing = skill.timing
-    for axis in (PAN, TILT):
-        pace, way = skill.drive(axis), drive.to[axis] - here[axis]
-        travel = (seen[axis] - here[axis]) * (1 if way > 0 else -1)
-        braking = pace.other(HALF_CHANGE) * pace.rate(1) ** 2
-        if LEAST_DEG < travel < abs(way) - 1.5 * braking - 3.0:
-            told = [Told(begun.received, timing.late(begun), 1)]
-            pace.learn(told, Seen(reply.sent, timing.late(reply), travel, NOISE_DEG + NOISE_S * pace.rate(1)))
-            pace.age()
 
 
 def judge(skill: Skill, here: Pose, drive: Drive, there: Pose) -> None:

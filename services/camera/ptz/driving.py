@@ -7,7 +7,6 @@ from typing import cast
 
 from services.camera.plan import Plan, wait
 from services.camera.ptz import drive as own
-from services.camera.ptz import zoom_drive
 from services.camera.ptz.arriving import Arriving
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Pose
@@ -53,22 +52,20 @@ class Driving:
 
     def _arrive(self, way: own.Drive, here: Pose, begun: Reply) -> Plan[tuple[Reading, float]]:
         """Looks at the firmware's own move until it has ended; once on the way, where its speed is not known well."""
-        now = begun.received
-        zooming = zoom_drive.begin(self.helm.skill, here[ZOOM], way.to[ZOOM], now)
-        arrives = now + own.longest(self.helm.skill, here, way.to)
-        known = all(self.helm.skill.drive(axis).known(1) for axis in (PAN, TILT))
-        if arrives - now > (LONG_S if known else 3 * self.helm.skill.timing.usual):
-            now = yield from wait(now + 0.6 * (arrives - now) - self.helm.skill.timing.usual)
+        now, skill, drive = begun.received, self.helm.skill, own.Begun(way, here, begun)
+        arrives = drive.arrives(skill)
+        known = all(skill.drive(axis).known(1) for axis in (PAN, TILT))
+        if arrives - now > (LONG_S if known else 3 * skill.timing.usual):
+            now = yield from wait(now + 0.6 * (arrives - now) - skill.timing.usual)
             reply = yield from self.helm.send(Status())
-            now, seen = reply.received, self.helm.limits.pose(cast(Reading, reply.result))
-            own.learn_on_the_way(self.helm.skill, here, way, begun, reply, seen)
-            zoom_drive.see(self.helm.skill, zooming, reply)
-            arrives = begun.received + own.longest(self.helm.skill, here, way.to)
-        certain = own.certain(self.helm.skill, way)
-        reading, now, rests = yield from Arriving(self.helm, way.to, zooming, certain).at_rest(arrives, now)
+            now = reply.received
+            drive.look(skill, reply, self.helm.limits.pose(cast(Reading, reply.result)))
+            arrives = drive.arrives(skill)
+        end = Arriving(self.helm, way.to, drive.zooming(skill), own.certain(skill, way))
+        reading, now, rests = yield from end.at_rest(arrives, now)
         self.helm.rests = arrives
         there = self.helm.limits.pose(reading) if rests else way.to  # one on its last bit of way teaches nothing
-        own.judge(self.helm.skill, here, way, there)
-        self.helm.skill.lead_zoom(reading.zoom, way.to[ZOOM])
+        own.judge(skill, here, way, there)
+        skill.lead_zoom(reading.zoom, way.to[ZOOM])
         self.helm.stand(reading)
         return reading, now

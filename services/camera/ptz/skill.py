@@ -153,7 +153,12 @@ class Skill:
     @property
     def step_s(self) -> float:
         """How long zoom may turn on its own and be read the same, in coarse steps."""
-        return STEP_LONGER * (self.zoom_grid or GRIDS[0]) / self.drive(2).rate(1)
+        return STEP_LONGER * self.zoom_step / self.drive(2).rate(1)
+
+    @property
+    def zoom_step(self) -> float:
+        """The step in which zoom is told, as far as is known: the coarsest, until it was seen to be finer."""
+        return self.zoom_grid or GRIDS[0]
 
     @property
     def read_late(self) -> float:

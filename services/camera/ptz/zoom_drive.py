@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import inf
 from typing import cast
 
-from services.camera.ptz.course import GRID, PAN, ZOOM
+from services.camera.ptz.course import PAN, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.pace import Seen, Told
 from services.camera.ptz.skill import ZOOM_SLOWS_S, Skill
@@ -28,7 +28,7 @@ def see(skill: Skill, glide: Glide, reply: Reply) -> None:
     """What a look shows of it on its way from rest: its speed, or where it has arrived, that it is no slower."""
     pace, timing, way = skill.drive(ZOOM), skill.timing, abs(glide.goal - glide.place)
     seen = abs(cast(Reading, reply.result).zoom - glide.place)
-    half = (skill.zoom_grid or GRID) / 2
+    half = skill.zoom_step / 2
     if way <= half or glide.began >= reply.sent:
         return
     pace.borrow(skill.paces[PAN])
@@ -53,7 +53,7 @@ def rests_late(skill: Skill, glide: Glide, seen: float) -> float:
 
     It was seen as soon as it was nearer than half a step: that takes as long in proportion as the way before it.
     """
-    way, half = abs(glide.goal - glide.place), (skill.zoom_grid or GRID) / 2
+    way, half = abs(glide.goal - glide.place), skill.zoom_step / 2
     return seen + (seen - glide.began) * half / max(half, way - half) + ZOOM_SLOWS_S
 
 
