@@ -1,34 +1,37 @@
-"""Learning the motors on purpose: every speed of every axis once there and back, watched, and back to where it looked.
+"""Learning the motors on purpose: every speed of each axis, watched, zoom from end to end, and back to where it looked.
 
-The same filters learn as in every move; this only shows them each speed early, and where the firmware goes on by parts
-of the picture, how large these are at each zoom. Nothing here pushes against a stop: each leg goes towards the middle
-of the range, and no farther than there is room for.
+The same filters learn as in every move; this only shows them each speed early, what the moments of answers mean, and
+where the firmware goes on by parts of the picture, how large these are at each zoom. How fast zoom is, is told by
+looks at chosen moments (`zoom_sweeps.py`). Nothing here pushes against a stop: each leg goes towards the middle of the
+range, and no farther than there is room for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import cast
 
 from services.camera.plan import Plan, wait
-from services.camera.ptz.course import END, PAN, TILT, ZOOM
+from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Goal, Limits
 from services.camera.ptz.helm import Helm, levels_of
 from services.camera.ptz.move import Arrival, goto
 from services.camera.ptz.pace import HALF_CHANGE, READ_LATE
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
+from services.camera.ptz.zoom_sweeps import sweep
 from services.camera.requests import Reading, Status
 
 NAMES = ("pan", "tilt", "zoom")
-LEG_S = 1.5  # each leg turns so long, or less where there is less room
-ROOM = 0.3  # of the way to the end stop that a leg may use
+LEG_S, ROOM = 1.5, 0.3  # each leg turns so long, and through so much of the way to the end stop at most
+LONG_S, LONG_ROOM = 3.0, 0.6  # those of the highest speed
+AGAIN = (8, 4)  # more of these, of pan and tilt: they tell exactly what the moments of answers mean
 FIRST_MOVE_DEG = 12.0  # shows the signs, and what the firmware honours
 MOVE_S = 60.0
-ZOOMS = (1, -1, 1, -1)
-LOOKS = 20  # on the way of zoom
-PLACES = 40  # for the relative form, whose scale they teach: some way from one to the next, and each at another zoom
+FIRST_PLACES = 3  # show what the firmware honours
+PLACES = 34  # with these, for the relative form, whose scale they teach: some way apart, and each at another zoom
 MARGIN = 0.15  # of a range, at either end, in which none of them lies
 
 
@@ -47,15 +50,20 @@ def calibrate(limits: Limits, skill: Skill) -> Plan[Arrival]:
     reading, now = yield from settle()
     pan, tilt, zoom = limits.pose(reading)
     began = limits.goal(pan % 360.0, min(limits.tilt[1], max(limits.tilt[0], tilt)), zoom)
-    yield from goto(_aside(limits, began), limits, skill, now + MOVE_S, near=reading)
+    reading = (yield from goto(_aside(limits, began), limits, skill, now + MOVE_S, near=reading)).reading
     for axis in (PAN, TILT):
-        for speed in skill.paces[axis].speeds:
-            now = yield from _leg(limits, skill, axis, speed)
-    now = yield from _zoom(limits, skill, now)
-    for goal in _places(limits):
+        *slower, fastest = skill.paces[axis].speeds
+        for speed in slower:
+            reading = yield from _leg(limits, skill, axis, speed, reading, LEG_S, ROOM)
+        for _ in range(1 + AGAIN[axis]):
+            reading = yield from _leg(limits, skill, axis, fastest, reading, LONG_S, LONG_ROOM)
+    now, places = (yield from wait(0.0)), _places(limits)
+    for goal in islice(places, FIRST_PLACES):
         now = (yield from goto(goal, limits, skill, now + MOVE_S)).at
-        if all(skill.honours.get(form) != "yes" for form in skill.scales):
-            break
+    now = yield from sweep(limits, skill, now)
+    if any(skill.honours.get(form) == "yes" for form in skill.scales):
+        for goal in places:
+            now = (yield from goto(goal, limits, skill, now + MOVE_S)).at
     return (yield from goto(began, limits, skill, now + MOVE_S))
 
 
@@ -82,45 +90,36 @@ def _places(limits: Limits) -> Iterator[Goal]:
         yield Goal((pan, tilt, low + (high - low) * (number % 5) / 4))
 
 
-def _leg(limits: Limits, skill: Skill, axis: int, speed: int) -> Plan[float]:
-    """One start and stop towards the middle of the range, with a reading on the way and one at rest."""
-    reading, now = yield from settle()
+def _leg(limits: Limits, skill: Skill, axis: int, speed: int, near: Reading, most: float, part: float) -> Plan[Reading]:
+    """One start and stop towards the middle of the range, with readings on the way and one at rest.
+
+    It turns for `most` seconds, or for a part of the time until the end stop; a late stop ends it before that, too.
+    """
+    reading, now = yield from settle(near)
     helm = Helm(Goal(limits.pose(reading)), limits, skill)
     helm.stand(reading)
     low, high = limits.ranges[axis]
     here = helm.course.origin[axis]
     way = 1 if here < (low + high) / 2 else -1
-    room = ROOM * ((high - here) if way > 0 else (here - low))
-    held = min(LEG_S, room / (skill.paces[axis].rate(speed) + 2 * skill.paces[axis].doubt(speed)))
+    room, pace = (high - here) if way > 0 else (here - low), skill.paces[axis]
+    stop = room / (pace.rate(speed) + 2 * pace.doubt(speed))  # it turns until there, at the fastest
+    held = min(most, part * stop, stop - skill.timing.tail)
     begun = yield from helm.start(levels_of({axis: way * speed}))
-    ends = begun.received + held - skill.timing.usual
-    now = yield from wait(max(begun.received, ends - skill.timing.usual - skill.timing.spread))
+    ends, last = begun.received + held - skill.timing.usual, skill.timing.usual + skill.timing.spread
+    now = begun.received
+    while now + 2 * last < ends:
+        now = yield from _look(helm, now)
+    now = yield from _look(helm, max(now, ends - last))
+    now = yield from helm.stop((yield from wait(max(now, ends))))
+    reading, _ = yield from helm.rest(now)
+    return reading
+
+
+def _look(helm: Helm, when: float) -> Plan[float]:
+    yield from wait(when)
     reply = yield from helm.send(Status())
     helm.course.read(reply, cast(Reading, reply.result))
-    now = yield from helm.stop((yield from wait(max(reply.received, ends))))
-    _, now = yield from helm.rest(now)
-    return now
-
-
-def _zoom(limits: Limits, skill: Skill, now: float) -> Plan[float]:
-    """Zoom from one end to the other and back, looked at all the way: its coarse steps tell its speed by and by."""
-    for level in (-1, *ZOOMS):
-        reading, now = yield from settle()
-        helm = Helm(Goal(limits.pose(reading)), limits, skill)
-        helm.stand(reading)
-        end, grid = limits.zoom[level > 0], skill.zoom_step
-        now = (yield from helm.start((0, 0, level))).received
-        for _ in range(LOOKS):
-            reply = yield from helm.send(Status())
-            now, reading = reply.received, cast(Reading, reply.result)
-            helm.course.read(reply, reading)
-            if abs(reading.zoom - end) < END:
-                break
-        last = grid / skill.paces[ZOOM].rate(1)  # to the very end, which a coarse reading does not tell
-        now = yield from helm.stop((yield from wait(now + last)))
-        if abs(reading.zoom - end) < END:
-            skill.zoomed = (reading.zoom, end)
-    return now
+    return reply.received
 
 
 def table(skill: Skill) -> list[Learnt]:

@@ -41,6 +41,12 @@ class Glide:
         """When no more than that is left of its way; not before it slows down for its goal."""
         return max(self.brakes, self.ends - sqrt(2 * left / self.acceleration))
 
+    def nears(self, left: float) -> float:
+        """The same at whatever speed it is then; not before it is as fast as it gets."""
+        *_, (seconds, top, _), (slows, _, _) = [(0.0, 0.0, 0.0)] * 2 + self._pieces()
+        faster = left - abs(top) * slows / 2
+        return self.brakes - min(seconds, faster / abs(top)) if faster > 0 and top else self.within(left)
+
     @property
     def brakes(self) -> float:
         """When it begins to slow down for its goal."""

@@ -86,8 +86,8 @@ class Helm:
         self.commands += 1
         reply = yield from ask(request)
         self.skill.timed(reply.received - reply.sent)
-        if isinstance(reply.result, Reading) and reply.result.moving:
-            self.skill.says_moving = True
+        if isinstance(reply.result, Reading):
+            self.skill.hear(reply.result.moving)
         return reply
 
     def start(self, levels: Levels) -> Plan[Reply]:

@@ -20,12 +20,12 @@ from services.camera.ptz.arriving import Arriving
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
-from services.camera.ptz.helm import RESTS_S, Helm
+from services.camera.ptz.helm import RESTS_S, Helm, sign
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE
 from services.camera.ptz.planes import Planes, Scale
 from services.camera.ptz.rush import rush
 from services.camera.ptz.scale import Hop, Turned
-from services.camera.ptz.skill import ZOOM_SLOWS_S, RelativeForm
+from services.camera.ptz.skill import RelativeForm
 from services.camera.requests import MoveOver, Reading, Refused, Reply, Status
 
 MOST = 6  # hops without a rest
@@ -40,6 +40,7 @@ FAR_DEG = 360.0  # no hop goes farther
 TRY_DEG = 12.0  # a first hop, whose scale is a guess
 SHORT, KNOWN = 0.5, 0.4  # spreads: a hop in flight ends before its goal, where no more of the doubt is left
 FLIES_DEG_S = 8.0  # of a hop that took the place of another one: from where is not known well enough then
+BACK_DEG_S = 2.0  # of one that turns it round: a look may be of the way out, or of the way back
 LATEST = 1.25  # spreads: when a hop acted that was answered later is not known well enough to foretell where it leads
 FEW = 2  # commands, for a hop from rest and a look
 
@@ -153,8 +154,11 @@ class Hopping:
     @property
     def _timely(self) -> bool:
         """Whether it is known when the hops acted, and from where the last one goes."""
-        if len(self.hops) > 1 and max(map(abs, self.hops[-1].speeds[:ZOOM])) > FLIES_DEG_S:
-            return False
+        if len(self.hops) > 1:
+            last = self.hops[-1]
+            back = any(last.speeds[axis] * sign(last.ways[axis]) < -BACK_DEG_S for axis in (PAN, TILT))
+            if back or max(map(abs, last.speeds[:ZOOM])) > FLIES_DEG_S:
+                return False
         return self.latest <= LATEST * self.helm.skill.timing.spread
 
     @property
@@ -227,7 +231,6 @@ class Hopping:
             low, high = helm.limits.ranges[axis]
             pace = helm.skill.drive(ZOOM) if axis == ZOOM else helm.skill.paces[axis]
             top, slow = pace.rate(pace.speeds[-1]), 2 * pace.other(HALF_CHANGE)
-            slow = ZOOM_SLOWS_S / top if axis == ZOOM else slow
             goal = min(high, max(low, place + way))
             self.glides.append(Glide(acted, place, speed, goal, top, 1 / slow, reply.received))
         begun, speeds = ((pan, tilt, zoom) for pan, tilt, zoom in zip(*poses, strict=True))

@@ -25,7 +25,7 @@ from services.camera.requests import Reading, Reply
 
 # When to look.
 LEFT_DEG = (1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, when the look is of: the earliest that tells enough
-LEFT_LEVELS = 0.3  # of zoom's way, at most, where it is told in coarse steps
+LEFT_LEVELS = 0.6  # of zoom's way, at most, where it is told in coarse steps
 EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
 EXPECTED_NOISE_DEG = 0.18  # and whose own noise is no more
 LATER = 0.4  # of the spread of answers: a look is so much later, so that a quick one is not before its time
@@ -42,11 +42,12 @@ UNSEEN = 0.15  # of the doubt of the goal is noise of a look that shows nothing 
 BENT = 0.3  # of how far off it ends: the reckoning of that may be wrong by so much
 
 # What follows from it.
-SURE = 2.25  # standard deviations that it may end farther off than is likeliest, to have arrived
+SURE = 1.75  # standard deviations that it may end farther off than is likeliest, to have arrived
 MISSED = 1.25  # and nearer, for a hop to go on from there: one too many does little harm
 OUTLIER = 2.0  # of them; a look farther off its course than that is of something else
 ARRIVES_DEG = 0.45  # it ends at its goal if it ends so near at the worst: 0.5 is promised
-NOISE_DEG = 0.4  # a look whose noise is more does not tell that
+NOISE_DEG = 0.4  # a look whose noise is more does not tell that,
+KNOWN_DEG = 0.18  # unless no more was in doubt before it
 RESTED_S = 0.02  # after it is reckoned to rest: what still moves then does not go as was reckoned
 GO_ON_DEG = 0.25  # doubt of where it ends, up to which a hop goes on from there
 TEACHES = 0.5  # of the doubt before it: a look that leaves less tells how far hops went
@@ -142,7 +143,7 @@ def _time(skill: Skill, late: float, share: float) -> float:
 def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> float | None:
     """When to ask for a look that tells where pan and tilt will rest, the earliest; None: no look would."""
     turning = glides[:ZOOM]
-    zoomed = glides[ZOOM].within(LEFT_LEVELS if skill.zoom_grid else 0.0)
+    zoomed = glides[ZOOM].nears(LEFT_LEVELS if skill.zoom_grid else 0.0)
     for left in LEFT_DEG:
         when = max(zoomed, *(glide.within(left) for glide in turning))
         told = [foretell(glide, when, glide.at(when)[0], known[axis]) for axis, glide in enumerate(turning)]
@@ -195,7 +196,8 @@ def judge(aim: Pose, near: float, told: Sequence[End]) -> Verdict:
     seen = max(abs(aim[axis] - end.seen) for axis, end in enumerate(told))
     if any(end.odd for end in told):
         return "unsure"
-    if most <= ARRIVES_DEG and seen <= NEAR_DEG and all(end.noise <= NOISE_DEG for end in told):
+    exact = all(end.noise <= NOISE_DEG or end.before <= KNOWN_DEG for end in told)
+    if most <= ARRIVES_DEG and seen <= NEAR_DEG and exact:
         return "there"
     if least > near and all(end.doubt < GO_ON_DEG for end in told):
         return "beside"

@@ -114,6 +114,7 @@ class Move:
             self.helm.commands += 2
         else:
             reading, now = near, (yield from wait(0.0))
+            self.helm.foretold = near.moving is None
         self.helm.stand(reading)
         return reading, now
 

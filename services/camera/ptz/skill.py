@@ -175,6 +175,11 @@ class Skill:
         """Whether readings of an axis at rest were seen to differ."""
         return self.steady < 0
 
+    def hear(self, moving: bool | None) -> None:
+        """What it says of its motion."""
+        self.says_moving |= moving is True
+        self.always_moving &= moving is not False
+
     def tells_rest(self, moving: bool | None) -> bool:
         """Whether what the camera says of its motion tells by itself that it rests: its word was seen to change."""
         return moving is False and self.says_moving and not self.always_moving

@@ -220,6 +220,8 @@ class Turning:
             blind, until = self.helm.course.unseen(now) + BLIND_S, self._looks_until(leg, left, now)
             risky, soon = self._risky(send + usual), send <= blind
             sure = not risky and all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)
+            if risky and until < now:
+                return now  # a look that came late could leave no time for an end that did, too
             if send - now < usual + spread or (not risky and (until < now or (look >= LOOKS and soon))):
                 break
             enough = ENOUGH_DEG if self.helm.commands < MANY_COMMANDS else self.helm.near

@@ -11,7 +11,7 @@ from typing import cast
 from services.camera.ptz.course import PAN, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.pace import Seen, Told
-from services.camera.ptz.skill import ZOOM_SLOWS_S, Skill
+from services.camera.ptz.skill import Skill
 from services.camera.requests import Reading, Reply
 
 SLOWEST = 2.0  # standard deviations that it may be slower than is known
@@ -20,8 +20,8 @@ NOISE_LEVELS = 0.5  # of where it was on its way, at the edge of a step of its r
 
 def begin(skill: Skill, here: float, to: float, acted: float) -> Glide:
     """Its way from rest, levels; `acted`: when that begins."""
-    top = skill.drive(ZOOM).rate(1)
-    return Glide(acted, here, 0.0, to, top, top / ZOOM_SLOWS_S, acted)
+    pace = skill.drive(ZOOM)
+    return Glide(acted, here, 0.0, to, pace.rate(1), pace.rate(1) / pace.change(1), acted)
 
 
 def see(skill: Skill, glide: Glide, reply: Reply) -> None:
@@ -45,7 +45,7 @@ def rests(skill: Skill, glide: Glide) -> float:
     """When it rests at the latest, as far as its speed is known by now."""
     pace, way = skill.drive(ZOOM), abs(glide.goal - glide.place)
     slowest = max(pace.rate(1) / 2, pace.rate(1) - SLOWEST * pace.doubt(1))
-    return glide.began + (way / slowest + ZOOM_SLOWS_S if way else 0.0)
+    return glide.began + (way / slowest + pace.change(1) if way else 0.0)
 
 
 def rests_late(skill: Skill, glide: Glide, seen: float) -> float:
@@ -54,7 +54,7 @@ def rests_late(skill: Skill, glide: Glide, seen: float) -> float:
     It was seen as soon as it was nearer than half a step: that takes as long in proportion as the way before it.
     """
     way, half = abs(glide.goal - glide.place), skill.zoom_step / 2
-    return seen + (seen - glide.began) * half / max(half, way - half) + ZOOM_SLOWS_S
+    return seen + (seen - glide.began) * half / max(half, way - half) + skill.drive(ZOOM).change(1)
 
 
 def shown(skill: Skill, glide: Glide, sent: float, since: float) -> bool:

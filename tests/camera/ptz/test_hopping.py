@@ -47,7 +47,11 @@ def test_when_so_much_of_its_way_is_left_is_told_of_its_braking(turn: int) -> No
     for left in (0.0, 0.1, 0.3):
         assert abs(glide.goal - glide.at(glide.within(left))[0]) == pytest.approx(left, abs=1e-6)
     assert glide.within(abs(way)) == glide.brakes > glide.began
-    assert Glide(5.0, 10.0, 0.0, 10.0, 45.0, 120.0, 0.0).within(0.1) == 5.0
+    for left in (0.0, 0.3, abs(way) / 4, abs(way) / 2):
+        assert abs(glide.goal - glide.at(glide.nears(left))[0]) == pytest.approx(left, abs=1e-6)
+    assert glide.began < glide.nears(abs(way)) <= glide.brakes
+    still = Glide(5.0, 10.0, 0.0, 10.0, 45.0, 120.0, 0.0)
+    assert still.within(0.1) == still.nears(0.1) == 5.0
 
 
 @pytest.mark.parametrize("mirror", [True, False])

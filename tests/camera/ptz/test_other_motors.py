@@ -13,7 +13,7 @@ CAMERAS = range(1, 7)
 GOALS = 25
 PUSHED = 1  # two late answers in a row do that to one in some thousands
 WITHIN_COMMANDS = 0.97
-RATE, ZOOM_RATE = 0.05, 0.12  # of the truth, off it after calibrating; zoom is read in coarse steps
+RATE, ZOOM_RATE = 0.05, 0.03  # of the truth, off it after calibrating
 DOUBT = 0.08  # of a rate; the fastest ones have room for hardly a second
 SLOW_DEG_S = 0.1  # readings are a tenth of a degree off, and a leg takes 1.5 s
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from services.camera.ptz.skill import Skill
 from services.simulators.camera.firmwares import PROFILES
 from tests import bounds
 from tests.camera.goals import LIMITS, Rig, random_goals
@@ -36,3 +37,14 @@ def test_that_a_rest_was_foretold_a_little_wrong_is_not_taken_for_dither(name: s
         rig.go(goal)
         rig.now += 1.0
     assert rig.skill.dithers == rig.profile.status_dither
+
+
+def test_a_camera_that_was_taken_for_one_that_always_says_it_moves_is_believed_again_when_it_says_it_rests() -> None:
+    skill = Skill(always_moving=True)
+    skill.hear(True)
+    skill.hear(None)
+    assert skill.always_moving
+    assert not skill.tells_rest(False)
+    skill.hear(False)
+    assert not skill.always_moving
+    assert skill.tells_rest(False)
