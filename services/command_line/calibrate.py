@@ -33,7 +33,7 @@ from services.whole_file import write_whole
 
 app = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
 Report = Annotated[Path | None, typer.Option("--out", help="Where the report goes; default <camera>-<what>.html.")]
-MOTORS_S, TOUR_S, SLACK_S = 600.0, 1800.0, 120.0
+MOTORS_S, TOUR_S, SLACK_S = 900.0, 1800.0, 120.0
 BAR, FULL, EMPTY = 30, "#", "."
 ASK = "May {} turn now? It looks for the markers all around, for some minutes, and returns to where it looked."
 
