@@ -60,7 +60,7 @@ def calibrate(limits: Limits, skill: Skill) -> Plan[Arrival]:
     now, places = (yield from wait(0.0)), _places(limits)
     for goal in islice(places, FIRST_PLACES):
         now = (yield from goto(goal, limits, skill, now + MOVE_S)).at
-    now = yield from sweep(limits, skill, now)
+    now = yield from sweep(limits, skill)
     if any(skill.honours.get(form) == "yes" for form in skill.scales):
         for goal in places:
             now = (yield from goto(goal, limits, skill, now + MOVE_S)).at

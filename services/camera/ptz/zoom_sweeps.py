@@ -27,8 +27,8 @@ LOOKS = 20  # at one of them
 SPARE = 1.2  # of a way by the relative form, so that the end is met exactly
 
 
-def sweep(limits: Limits, skill: Skill, now: float) -> Plan[float]:
-    """Learns the rate of zoom; it is left at an end of its range."""
+def sweep(limits: Limits, skill: Skill) -> Plan[float]:
+    """Learns the rate of zoom; it is left at an end of its range. Returns when that was."""
     own = not isinstance(_request(limits, skill, (0.0, 0.0, limits.zoom[0]), limits.zoom[1]), Start)
     pace = skill.drive(ZOOM) if own else skill.paces[ZOOM]
     known = ZoomRate(pace)
