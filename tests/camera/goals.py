@@ -247,7 +247,7 @@ def named() -> dict[str, Profile]:
 def wanted(profile: Profile, *, calibrated: bool = False) -> float:
     """The bound of the median of time over least time."""
     if profile.position_relative == "works" and not positions(profile):
-        return bounds.MEDIAN_RELATIVE_CALIBRATED if calibrated else bounds.MEDIAN_RELATIVE
+        return bounds.MEDIAN_POSITIONS if calibrated else bounds.MEDIAN_RELATIVE
     return bounds.MEDIAN_POSITIONS if positions(profile) else bounds.MEDIAN_START_STOP
 
 

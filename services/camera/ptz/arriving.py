@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import sqrt
 from typing import cast
 
 from services.camera.device import same
 from services.camera.plan import Plan, wait
 from services.camera.ptz import zoom_drive
-from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.course import FOREVER, PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
-from services.camera.ptz.helm import FOREVER, PAIR_S, Helm
+from services.camera.ptz.helm import PAIR_S, Helm
 from services.camera.ptz.pace import HALF_CHANGE, READ_LATE
 from services.camera.ptz.skill import NEARER_DEG, Skill
 from services.camera.requests import Reading, Reply, Status
 
+FEW = 3  # commands left
 LOOKS = 30  # less and less often
 LONG_S = 2.0  # apart, at most
 THERE_DEG = 0.15  # what is farther off is on its last bit of way
@@ -47,7 +48,8 @@ class Arriving:
         Returns the reading, when it rests, and whether that surely shows the camera at rest.
         """
         skill = self.helm.skill
-        yield from wait(max(now, arrives - skill.read_late + skill.arrives_late))
+        late = max(skill.arrives_late, skill.timing.spread if self.helm.left <= FEW else 0.0)  # none of those too soon
+        yield from wait(max(now, arrives - skill.read_late + late))
         for _ in range(LOOKS):
             reply = yield from self._look()
             if self._there or self._beside or self._still(reply.sent):
@@ -58,7 +60,7 @@ class Arriving:
         still = self._still(reply.sent)
         if still or skill.tells_rest(self.seen[-1].moving):
             return self.seen[-1], reply.received, self._rests or still
-        return self.seen[-1], (yield from wait(max(reply.received, self._rested(reply)))), self._rests
+        return self._last(reply, arrives), (yield from wait(max(reply.received, self._rested(reply)))), self._rests
 
     def _look(self) -> Plan[Reply]:
         reply = yield from self.helm.send(Status())
@@ -68,6 +70,17 @@ class Arriving:
         self.helm.skill.says_late |= again and self.seen[-2].moving is True
         zoom_drive.see(self.helm.skill, self.zooming, reply)
         return reply
+
+    def _last(self, reply: Reply, arrives: float) -> Reading:
+        """The reading of the rest: where one tells of a moment before that, it surely goes on to its end.
+
+        Whether it moves there nobody has told.
+        """
+        skill, seen = self.helm.skill, self.seen[-1]
+        over = skill.paces[PAN].seen_at(reply.sent, skill.timing.late(reply)) >= arrives
+        if over or self._rests or not self._there or self._off <= THERE_DEG:
+            return seen
+        return replace(seen, pan=round(self.to[PAN] % 360.0, 2), tilt=round(self.to[TILT], 2), moving=None)
 
     @property
     def _off(self) -> float:

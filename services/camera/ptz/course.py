@@ -16,6 +16,7 @@ READ_DEG = 0.08  # the resolution, and a little dither
 COARSE = 0.3  # of a step of its reading: standard deviation
 MOVED_DEG = 0.3  # no reading at rest changes as much
 CLEAR_DEG = 2.0  # so far the wrong way is not a doubtful reading
+FOREVER = 1e12
 TIME_S = 0.01  # what is left of the timing of a command or a reading when all that is learnt is taken off
 
 
@@ -34,6 +35,7 @@ class Course:
 
     def tell(self, reply: Reply, levels: tuple[int, int, int]) -> None:
         """A command was answered: from then on it turns like this."""
+        self.skill.paces[ZOOM].borrow(self.skill.paces[PAN])
         late = self.skill.timing.late(reply)
         for axis, level in enumerate(levels):
             if level != self.levels[axis]:
@@ -49,6 +51,12 @@ class Course:
         told = [*self.told[axis], Told(when, 0.0, 0)]
         pace = self.skill.paces[axis]
         return self.origin[axis] + pace.travel(told, when + 60.0) + self.shift[axis]
+
+    def meet_end(self, axis: int) -> None:
+        """An axis that was ended rests within its range, however long it was turned."""
+        low, high = self.limits.ranges[axis]
+        rests = self.stopped(axis, FOREVER)
+        self.shift[axis] += min(high, max(low, rests)) - rests
 
     def end_for(self, axis: int, goal: float, now: float) -> float:
         """When a command that ends an axis has to take effect for it to rest at the goal; not before now."""
@@ -92,9 +100,7 @@ class Course:
                 self._see_sense(axis, pose[axis])
             if not told or not self.skill.senses[axis].sure:
                 continue
-            if axis == ZOOM:
-                self.skill.paces[ZOOM].borrow(self.skill.paces[PAN])
-            else:
+            if axis != ZOOM:
                 self._doubt_sense(axis, reply, late, pose[axis])
             self._learn(axis, reply, late, pose[axis])
 

@@ -9,7 +9,7 @@ from typing import cast
 from services.camera.device import same
 from services.camera.plan import Plan, ask, wait
 from services.camera.ptz import zoom_drive
-from services.camera.ptz.course import PAN, TILT, ZOOM, Course
+from services.camera.ptz.course import FOREVER, PAN, TILT, ZOOM, Course
 from services.camera.ptz.drive import Begun
 from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE, READ_LATE, READ_PART, STOP_LATE
@@ -24,7 +24,6 @@ LATE_DOUBT_S = 0.15  # the age of readings is not known well: two equal ones, th
 LONGEST_DOUBT_S = 0.35
 PAIR_S = 0.25  # between two readings that are compared
 UNSURE_LEVELS = 0.1  # it is not said to stand at the very end, which it may just have missed
-FOREVER = 1e12
 WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
 LAST_DEG, LAST_DOUBT = 0.5, 0.5  # the last bit of way, of which a reading tells the rest; a share of it is doubted
 RESTS_S = 0.02  # after it is reckoned to rest, where the camera does not tell it

@@ -39,10 +39,9 @@ SHARP_DEG = 0.05  # what the reckoning leaves open, at least
 FAR_DEG = 360.0  # no hop goes farther
 TRY_DEG = 12.0  # a first hop, whose scale is a guess
 SHORT, KNOWN = 0.5, 0.4  # spreads: a hop in flight ends before its goal, where no more of the doubt is left
-FLIES_DEG_S = 8.0  # of a hop that took the place of another one: from where is not known well enough then
-BACK_DEG_S = 2.0  # of one that turns it round: a look may be of the way out, or of the way back
+BACK_DEG_S = 2.0  # of a hop that turns one round: a look may be of the way out, or of the way back
 LATEST = 1.25  # spreads: when a hop acted that was answered later is not known well enough to foretell where it leads
-FEW = 2  # commands, for a hop from rest and a look
+FEW, LAST = 2, 1  # commands, for a hop from rest and a look; for a look, which has to be one at rest then
 
 
 class Hopping:
@@ -99,6 +98,10 @@ class Hopping:
         about = 0.0 if self._exact(to) else ABOUT_DEG
         end = Arriving(self.helm, to, self.zooming, certain, about, hops=True)
         reading, now, _ = yield from end.at_rest(arrives, now)
+        if reading is not end.seen[-1]:
+            self.helm.skill.lead_zoom(reading.zoom, to[ZOOM])
+            self.helm.stand(reading)
+            return reading, now
         if certain and self._timely:
             known = landing.doubts(self.helm.skill, self.form, self.hops, self.foretold)
             rest = [landing.read(*one) for one in zip(self.helm.limits.pose(reading), known, strict=False)]
@@ -116,7 +119,7 @@ class Hopping:
     def _land(self, now: float) -> Plan[tuple[Reading, float] | None]:
         """Looks on the last bit of way, and hops on where that leads beside the goal; None: it is not sure where."""
         helm = self.helm
-        while helm.left > 0 and self._timely:
+        while helm.left > LAST and self._timely:
             doubts = landing.doubts(helm.skill, self.form, self.hops, self.foretold)
             look = landing.sight(helm.skill, self.glides, doubts)
             if look is None:
@@ -137,9 +140,8 @@ class Hopping:
             helm.stand(reading)
             helm.rests = arrives
             if verdict == "there" or helm.left < FEW or not helm.beside(helm.limits.pose(reading)):
-                return reading, (
-                    yield from wait(max(now, arrives + RESTS_S, zoom_drive.rests(helm.skill, self.zooming)))
-                )
+                rests = max(arrives + landing.late(doubts), zoom_drive.rests(helm.skill, self.zooming))
+                return reading, (yield from wait(max(now, rests + RESTS_S)))
             began = min(arrives, now)
             for axis, end in enumerate(ends):
                 self.glides[axis] = replace(self.glides[axis], began=began, place=end.at, speed=0.0, goal=end.at)
@@ -157,7 +159,7 @@ class Hopping:
         if len(self.hops) > 1:
             last = self.hops[-1]
             back = any(last.speeds[axis] * sign(last.ways[axis]) < -BACK_DEG_S for axis in (PAN, TILT))
-            if back or max(map(abs, last.speeds[:ZOOM])) > FLIES_DEG_S:
+            if back:
                 return False
         return self.latest <= LATEST * self.helm.skill.timing.spread
 

@@ -24,11 +24,11 @@ from services.camera.ptz.skill import NEAR_DEG, RelativeForm, Skill
 from services.camera.requests import Reading, Reply
 
 # When to look.
-LEFT_DEG = (1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, when the look is of: the earliest that tells enough
+LEFT_DEG = (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, the most that tells enough
 LEFT_LEVELS = 0.6  # of zoom's way, at most, where it is told in coarse steps
 EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
-EXPECTED_NOISE_DEG = 0.18  # and whose own noise is no more
-LATER = 0.4  # of the spread of answers: a look is so much later, so that a quick one is not before its time
+EXPECTED_NOISE_DEG, EXPECTED_EXACT_DEG = 0.4, 0.18  # and whose own noise is no more; where hops are not familiar yet
+LATER, LATER_YET = 0.1, 0.4  # of the spread of answers: so much later, since a quick one is before its time; there
 
 # What is known without a look, and how exact one is; standard deviations.
 LEAST_DEG = 0.05  # of where hops lead
@@ -38,19 +38,20 @@ READ_DEG = 0.06  # of a reading
 LEAST_S = 0.004  # of the moment that a look tells of
 STEP_DEG = 0.05  # of the goal: what it would change of a look
 LEAST_SHOWN = 0.1  # of a change of the goal; before it brakes a look shows none
-UNSEEN = 0.15  # of the doubt of the goal is noise of a look that shows nothing of the goal
-BENT = 0.3  # of how far off it ends: the reckoning of that may be wrong by so much
+UNSEEN = 0.1  # of the doubt of the goal is noise of a look that shows nothing of the goal
+BENT = 0.15  # of how far off it ends: the reckoning of that may be wrong by so much
 
 # What follows from it.
 SURE = 1.75  # standard deviations that it may end farther off than is likeliest, to have arrived
 MISSED = 1.25  # and nearer, for a hop to go on from there: one too many does little harm
+FAMILIAR = 0.3  # of all doubt: where experience leaves more, a look by itself has to show it at its goal, exactly
+NOISE_DEG = 0.4  # which it does not with more noise,
+KNOWN_DEG = 0.18  # unless no more was in doubt before it
 OUTLIER = 2.0  # of them; a look farther off its course than that is of something else
 ARRIVES_DEG = 0.45  # it ends at its goal if it ends so near at the worst: 0.5 is promised
-NOISE_DEG = 0.4  # a look whose noise is more does not tell that,
-KNOWN_DEG = 0.18  # unless no more was in doubt before it
 RESTED_S = 0.02  # after it is reckoned to rest: what still moves then does not go as was reckoned
 GO_ON_DEG = 0.25  # doubt of where it ends, up to which a hop goes on from there
-TEACHES = 0.5  # of the doubt before it: a look that leaves less tells how far hops went
+TEACHES = 0.7  # of the doubt before it: a look that leaves less tells how far hops went
 
 Verdict = Literal["there", "beside", "unsure"]
 
@@ -77,13 +78,19 @@ class Doubts:
         """Where it will rest, degrees."""
         return hypot(self.goal, self.place)
 
+    @property
+    def familiar(self) -> bool:
+        """Whether experience leaves little doubt of such motions."""
+        return self.share <= FAMILIAR
+
 
 @dataclass(frozen=True)
 class End:
     """Where an axis will rest, degrees.
 
     `doubt`: standard deviation of `at`, and `before`: what that was before the look; `seen`: where it will rest by the
-    look alone, and `noise`: standard deviation of that; `odd`: the look is too far off for a motion as was reckoned.
+    look alone, and `noise`: standard deviation of that; `odd`: the look is too far off for a motion as was reckoned;
+    `familiar`: such motions mostly go as is reckoned.
     """
 
     at: float
@@ -92,6 +99,7 @@ class End:
     seen: float
     noise: float
     odd: bool = False
+    familiar: bool = False
 
 
 def doubts(skill: Skill, form: RelativeForm, hops: Sequence[Hop], place: float) -> tuple[Doubts, Doubts]:
@@ -142,13 +150,14 @@ def _time(skill: Skill, late: float, share: float) -> float:
 
 def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> float | None:
     """When to ask for a look that tells where pan and tilt will rest, the earliest; None: no look would."""
-    turning = glides[:ZOOM]
+    turning, familiar = glides[:ZOOM], all(one.familiar for one in known)
+    noise, later = (EXPECTED_NOISE_DEG, LATER) if familiar else (EXPECTED_EXACT_DEG, LATER_YET)
     zoomed = glides[ZOOM].nears(LEFT_LEVELS if skill.zoom_grid else 0.0)
     for left in LEFT_DEG:
         when = max(zoomed, *(glide.within(left) for glide in turning))
         told = [foretell(glide, when, glide.at(when)[0], known[axis]) for axis, glide in enumerate(turning)]
-        if all(end.doubt <= EXPECTED_DOUBT_DEG and end.noise <= EXPECTED_NOISE_DEG for end in told):
-            return when - skill.read_late + LATER * skill.timing.spread
+        if all(end.doubt <= EXPECTED_DOUBT_DEG and end.noise <= noise for end in told):
+            return when - skill.read_late + later * skill.timing.spread
     return None
 
 
@@ -167,7 +176,13 @@ def foretell(glide: Glide, seen: float, place: float, known: Doubts) -> End:
     noise = hypot(noise * (1 + bends / 2), wrong * bends / 2, UNSEEN * bends * known.goal)
     spread = hypot(before, noise)
     at = glide.goal + (before / spread) ** 2 * off
-    return End(at, hypot(before * noise / spread, BENT * off), before, glide.goal + off, noise, odd)
+    doubt = hypot(before * noise / spread, BENT * off)
+    return End(at, doubt, before, glide.goal + off, noise, odd, known.familiar)
+
+
+def late(known: Sequence[Doubts]) -> float:
+    """How much later than is reckoned pan and tilt may rest, seconds: what experience left of it is not counted on."""
+    return max(one.start / one.share for one in known)
 
 
 def read(place: float, known: Doubts) -> End:
@@ -193,15 +208,20 @@ def judge(aim: Pose, near: float, told: Sequence[End]) -> Verdict:
     off = [abs(aim[axis] - end.at) for axis, end in enumerate(told)]
     most = max(one + SURE * end.doubt for one, end in zip(off, told, strict=True))
     least = max(one - MISSED * end.doubt for one, end in zip(off, told, strict=True))
-    seen = max(abs(aim[axis] - end.seen) for axis, end in enumerate(told))
     if any(end.odd for end in told):
         return "unsure"
-    exact = all(end.noise <= NOISE_DEG or end.before <= KNOWN_DEG for end in told)
-    if most <= ARRIVES_DEG and seen <= NEAR_DEG and exact:
+    if most <= ARRIVES_DEG and all(_shows(aim[axis], end) for axis, end in enumerate(told)):
         return "there"
     if least > near and all(end.doubt < GO_ON_DEG for end in told):
         return "beside"
     return "unsure"
+
+
+def _shows(aim: float, end: End) -> bool:
+    """Whether the look by itself speaks for an end at the goal."""
+    if end.familiar:
+        return abs(aim - end.seen) <= max(NEAR_DEG, end.noise)
+    return abs(aim - end.seen) <= NEAR_DEG and (end.noise <= NOISE_DEG or end.before <= KNOWN_DEG)
 
 
 def learn(
@@ -216,8 +236,8 @@ def learn(
     """What is foretold teaches, too, where the look tells how far hops went, and not only that it went as reckoned."""
     pan, tilt, zoom = (glide.goal for glide in glides)
     if all(end.doubt < TEACHES * end.before for end in told):
-        there = replace(reading, pan=told[PAN].at, tilt=told[TILT].at)
-        noise = max(scale.READ_DEG, *(end.doubt for end in told))
+        there = replace(reading, pan=told[PAN].seen, tilt=told[TILT].seen)
+        noise = max(scale.READ_DEG, *(end.noise for end in told))
         scale.learn(skill, form, hops, (pan, tilt, zoom), limits, there, noise)
     else:
         skill.lead_zoom(reading.zoom, zoom)

@@ -78,7 +78,7 @@ class Turning:
             if ahead:
                 axes = sorted({*ahead, *self._beside(now)})
                 continue
-            now = yield from (self.zooming.begin() if zoom else self.helm.stop(now))
+            now = yield from (self.zooming.begin() if zoom or self.zooming.misses() else self.helm.stop(now))
             zoom, axes = False, self._reckon(now)
             if not axes:
                 return now
@@ -181,10 +181,16 @@ class Turning:
         stop = high - before if self.helm.course.levels[axis] > 0 else low + before
         return self.helm.course.end_for(axis, stop, now)
 
+    def _surely(self, axis: int, now: float) -> float:
+        """The same where it is farther than is reckoned; of more doubt than is usual a look is to tell."""
+        rate = self._rate(axis)
+        ends = self._safe(axis, rate, now)
+        return ends - min(ENOUGH_DEG, self.helm.course.doubt(axis, ends)) / rate
+
     def _looks_until(self, leg: Leg, left: dict[int, int], now: float) -> float:
         """Until when a look may be asked for: later, a late answer to it and then to an end lets an axis push."""
         turning, timing = [axis for axis in (PAN, TILT) if self.helm.course.levels[axis]], self.helm.skill.timing
-        ends = min(self._safe(axis, self._rate(axis), now) for axis in turning)
+        ends = min(self._surely(axis, now) for axis in turning)
         others = 0 if leg.joint else len(left) - 1  # are ended before it
         return ends - (2 + others) * timing.usual - timing.tail
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import cast
 
 from services.camera.plan import Plan, ask, wait
-from services.camera.ptz.course import ZOOM
+from services.camera.ptz.course import FOREVER, ZOOM
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.helm import NEAR_LEVELS, Helm, sign
 from services.camera.ptz.skill import Skill
@@ -18,6 +18,7 @@ from services.camera.requests import Direction, Reading, Start, Status
 WIDE_LEVELS, HELD_S = 0.05, 0.2
 BEYOND = 0.8  # of what is near enough may be gone beyond the goal
 LOOKS = 3  # readings while it turns
+SURE = 2.0  # doubts of where it ended
 
 
 def widest(limits: Limits, skill: Skill, now: float) -> Plan[float]:
@@ -44,7 +45,16 @@ class Zooming:
 
     def _way(self) -> float:
         """How far zoom has to go, with its sign."""
-        return self.helm.zoom_aim() - self.helm.course.at(ZOOM, 0.0)
+        return self.helm.zoom_aim() - self.helm.course.stopped(ZOOM, FOREVER)
+
+    def misses(self) -> bool:
+        """Whether zoom was ended too late, or too soon, as surely as that needs no reading."""
+        course = self.helm.course
+        if not course.told[ZOOM] or course.levels[ZOOM]:
+            return False
+        course.meet_end(ZOOM)
+        off = abs(self.helm.goal.pose[ZOOM] - course.stopped(ZOOM, FOREVER))
+        return off > self.helm.zoom_near + SURE * course.doubt(ZOOM, FOREVER)
 
     def begin(self) -> Plan[float]:
         """Starts zoom; it goes on. A way that is shorter than the smallest step begins the other way."""
