@@ -112,12 +112,8 @@ class Helm:
 
     def rest(self, now: float) -> Plan[tuple[Reading, float]]:
         """The reading of pan and tilt at rest, and of zoom when it does not turn."""
-        usual = self.skill.timing.usual
-        pace, settled = self.skill.paces[PAN], self._settled()
-        if self.zoom_ends is not None and self.zoom_ends < max(now, settled) + usual + self.skill.timing.spread:
-            now = yield from self.stop((yield from wait(max(now, self.zoom_ends))))
-            settled = self._settled()
-        now = yield from wait(max(now, settled))
+        pace = self.skill.paces[PAN]
+        now = yield from wait(max(now, self.settled()))
         self.rests = self._rests()
         reply, seen, reading = yield from self._look()
         since = reply.sent
@@ -249,7 +245,7 @@ class Helm:
         """How much longer it may take to slow down than is reckoned, seconds."""
         return max(self.skill.paces[axis].other_doubt(HALF_CHANGE) * self._fastest(axis) for axis in (PAN, TILT))
 
-    def _settled(self) -> float:
+    def settled(self) -> float:
         """When a reading has to be asked for that shows everything at rest."""
         pace = self.skill.paces[PAN]
         doubt = pace.other_doubt(READ_LATE) + self._slows()

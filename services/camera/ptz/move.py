@@ -103,9 +103,7 @@ class Move:
                 now = yield from self.zooming.begin()
             else:
                 now = yield from self.zooming.see_through(now)
-            if self.zooming.misses():
-                now = yield from self.zooming.begin()
-            reading, now = yield from self.helm.rest(now)
+            reading, now = yield from self.helm.rest((yield from self.zooming.settle(now)))
             self._notice(before, self.helm.limits.pose(reading), out)
         raise DeviceError(self._failed(reading, f"with {MOST_LEGS} motions"))
 

@@ -27,6 +27,7 @@ LOST_DEG = 1.0  # as much doubt about the place of an axis that turns is usual
 SHARP_DEG = 0.05  # what a reckoning leaves open, at least
 ZOOM_COMMANDS = 1  # zoom's start is the end of a leg
 MANY_COMMANDS = 7  # after so many, a look has to be worth more
+FARTHER_DEG = 0.2  # than is reckoned an axis may be, for a look not to be had too late
 ENOUGH_DEG = 0.4  # doubt about the place of an end that needs no look
 PROBE_S = 0.35  # seen in the readings
 PROBE_LONG_S = 1.5  # shows how fast it is, too, and is harmless the wrong way
@@ -185,7 +186,7 @@ class Turning:
         """The same where it is farther than is reckoned; of more doubt than is usual a look is to tell."""
         rate = self._rate(axis)
         ends = self._safe(axis, rate, now)
-        return ends - min(ENOUGH_DEG, self.helm.course.doubt(axis, ends)) / rate
+        return ends - min(FARTHER_DEG, self.helm.course.doubt(axis, ends)) / rate
 
     def _looks_until(self, leg: Leg, left: dict[int, int], now: float) -> float:
         """Until when a look may be asked for: later, a late answer to it and then to an end lets an axis push."""

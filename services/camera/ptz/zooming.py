@@ -19,6 +19,7 @@ WIDE_LEVELS, HELD_S = 0.05, 0.2
 BEYOND = 0.8  # of what is near enough may be gone beyond the goal
 LOOKS = 3  # readings while it turns
 SURE = 2.0  # doubts of where it ended
+AGAIN = 3  # ends without a look, at most
 
 
 def widest(limits: Limits, skill: Skill, now: float) -> Plan[float]:
@@ -46,6 +47,21 @@ class Zooming:
     def _way(self) -> float:
         """How far zoom has to go, with its sign."""
         return self.helm.zoom_aim() - self.helm.course.stopped(ZOOM, FOREVER)
+
+    def settle(self, now: float) -> Plan[float]:
+        """Ends zoom where that is due before a look; where it surely missed it turns again."""
+        for _ in range(AGAIN):
+            now = yield from self._end(now)
+            if not self.misses():
+                return now
+            now = yield from self.begin()
+        return (yield from self._end(now))
+
+    def _end(self, now: float) -> Plan[float]:
+        ends, timing = self.helm.zoom_ends, self.helm.skill.timing
+        if ends is None or ends >= max(now, self.helm.settled()) + timing.usual + timing.spread:
+            return now
+        return (yield from self.helm.stop((yield from wait(max(now, ends)))))
 
     def misses(self) -> bool:
         """Whether zoom was ended too late, or too soon, as surely as that needs no reading."""

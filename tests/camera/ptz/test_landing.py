@@ -9,7 +9,7 @@ import pytest
 
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
-from services.camera.ptz.landing import Doubts, End, at_end, doubts, ends, foretell, judge, read
+from services.camera.ptz.landing import Doubts, End, at_end, doubts, ends, foretell, judge, read, sight
 from services.camera.ptz.scale import Hop
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Reading, Reply, Status
@@ -19,6 +19,7 @@ KNOWN = Doubts(goal=0.2, place=0.0, read=0.06, time=0.005, change=0.02)
 LATE = WAY.within(0.3)  # most of the braking is done then
 AIM: Pose = (40.0, 20.0, 0.0)
 STANDS = read(20.0, KNOWN)
+FAMILIAR = replace(KNOWN, goal=0.06, share=0.2)  # so little of all doubt is left by experience
 
 
 def test_a_look_that_is_as_was_reckoned_leaves_the_goal_and_little_doubt() -> None:
@@ -108,6 +109,23 @@ def test_it_has_arrived_where_it_surely_ends_at_the_goal() -> None:
     assert judge(AIM, 0.42, (replace(end, seen=40.5), STANDS)) == "unsure"
     assert judge(AIM, 0.42, (replace(end, noise=0.5), STANDS)) == "unsure"
     assert judge(AIM, 0.42, (replace(end, odd=True), STANDS)) == "unsure"
+
+
+def test_where_hops_are_familiar_a_look_on_the_way_may_be_as_far_off_as_its_noise() -> None:
+    early = WAY.within(2.0)
+    end = foretell(WAY, early, WAY.at(early)[0], FAMILIAR)
+    assert judge(AIM, 0.42, (end, STANDS)) == "there"
+    assert judge(AIM, 0.42, (replace(end, seen=40.5, noise=0.6), STANDS)) == "there"
+    assert judge(AIM, 0.42, (replace(end, seen=40.7, noise=0.6), STANDS)) == "unsure"
+    assert judge(AIM, 0.42, (replace(end, seen=40.5, noise=0.6, familiar=False), STANDS)) == "unsure"
+
+
+def test_where_hops_are_familiar_a_look_is_had_earlier_on_the_way() -> None:
+    skill, still = Skill(), replace(WAY, place=20.0, goal=20.0)
+    looks = [sight(skill, (WAY, still, still), (known, known)) for known in (FAMILIAR, replace(KNOWN, goal=0.06))]
+    assert looks[0] is not None
+    assert looks[1] is not None
+    assert WAY.brakes < looks[0] < looks[1] - 0.05
 
 
 @pytest.mark.parametrize(("doubt", "verdict"), [(0.1, "beside"), (0.24, "unsure"), (0.5, "unsure")])

@@ -1,4 +1,4 @@
-"""Zoom at its very widest, which a coarse reading does not tell."""
+"""Zoom at its very widest, which a coarse reading does not tell, and where a late answer let it go too far."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.zooming import widest
+from services.camera.requests import Reply, Request, Start, Status, Stop
+from services.simulators.camera.firmwares import PROFILES
+from tests.camera.goals import Rig
 from tests.camera.motors import Motors, drive
 
 LIMITS = Limits()
@@ -32,3 +35,33 @@ def test_at_the_very_end_it_stays_while_pan_and_tilt_turn() -> None:
     motors.sent.clear()
     drive(widest(LIMITS, skill, 1200.0 + took), motors, now=1200.0 + took)
     assert motors.sent == []
+
+
+class LateStop(Rig):
+    """Answers take the same time but for one: the first stop after `late` is set takes so many seconds more."""
+
+    even, late = False, 0.0
+
+    def _send(self, request: Request, ticket: int) -> Reply:
+        if self.even:
+            took = self.profile.latency_s
+            if isinstance(request, Stop):
+                took, self.late = took + self.late, 0.0
+            self.device.latency.control = lambda now: took  # type: ignore[method-assign]
+        return super()._send(request, ticket)
+
+
+def test_zoom_that_a_late_answer_let_go_too_far_is_put_right_without_a_look() -> None:
+    rig = LateStop(PROFILES["ip3m-943b"], 3)
+    rig.calibrate()
+    rig.even = True
+    pan, tilt = 100.0, 40.0
+    rig.go((pan, tilt, 6.0))
+    for late in (0.0, 0.8):
+        asked: list[type[Request]] = []
+        rig.log = lambda reply, asked=asked: asked.append(type(reply.request))  # type: ignore[misc]
+        rig.late = late
+        outcome = rig.go((pan, tilt, 2.0 if late else 4.0))
+        assert outcome.error is None
+        assert outcome.off_zoom <= 1.0
+        assert asked == ([Start, Stop, Start, Stop, Status] if late else [Start, Stop, Status])
