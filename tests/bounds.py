@@ -5,7 +5,7 @@ from __future__ import annotations
 GOALS = 50  # at random in pan, tilt and zoom, on both sides of the dead arc, one after the other from a cold start
 OFF_DEG = 0.5  # the truth, when `done` is said
 MEDIAN_START_STOP = 2.0  # time over the least time of the motors, where the camera takes only start and stop
-MEDIAN_POSITIONS = 1.3  # where it honours an absolute position, or the goal is a place that has a preset
+MEDIAN_POSITIONS = 1.3  # where it honours a position, absolute or relative, or the goal is a place that has a preset
 MEDIAN_RELATIVE = 1.42  # not 1.3 where only one within the picture is, until the camera is calibrated
 MEDIAN_BESIDE = 2.0  # of start and stop from a preset that is up to PRESET_DEG beside the goal
 PRESET_DEG = 2.0

@@ -52,11 +52,14 @@ class Course:
         pace = self.skill.paces[axis]
         return self.origin[axis] + pace.travel(told, when + 60.0) + self.shift[axis]
 
-    def meet_end(self, axis: int) -> None:
-        """An axis that was ended rests within its range, however long it was turned."""
+    def rests(self, axis: int) -> float:
+        """Where an axis that was ended comes to rest: within its range, however long it was turned."""
         low, high = self.limits.ranges[axis]
-        rests = self.stopped(axis, FOREVER)
-        self.shift[axis] += min(high, max(low, rests)) - rests
+        return min(high, max(low, self.stopped(axis, FOREVER)))
+
+    def meet_end(self, axis: int) -> None:
+        """The same, for what it is told next."""
+        self.shift[axis] += self.rests(axis) - self.stopped(axis, FOREVER)
 
     def end_for(self, axis: int, goal: float, now: float) -> float:
         """When a command that ends an axis has to take effect for it to rest at the goal; not before now."""

@@ -98,17 +98,20 @@ class Hopping:
         about = 0.0 if self._exact(to) else ABOUT_DEG
         end = Arriving(self.helm, to, self.zooming, certain, about, hops=True)
         reading, now, _ = yield from end.at_rest(arrives, now)
-        if reading is not end.seen[-1]:
+        if reading is end.seen[-1]:
+            self._learn(reading, to, certain=certain)
+        else:  # one on its last bit of way teaches nothing
             self.helm.skill.lead_zoom(reading.zoom, to[ZOOM])
-            self.helm.stand(reading)
-            return reading, now
+        self.helm.stand(reading)
+        return reading, now
+
+    def _learn(self, reading: Reading, to: Pose, *, certain: bool) -> None:
+        """What a reading at rest tells of the hops that should lead `to` there."""
         if certain and self._timely:
             known = landing.doubts(self.helm.skill, self.form, self.hops, self.foretold)
             rest = [landing.read(*one) for one in zip(self.helm.limits.pose(reading), known, strict=False)]
             landing.stray(self._scale, self.glides, known, rest)
         scale.learn(self.helm.skill, self.form, self.hops, to, self.helm.limits, reading)
-        self.helm.stand(reading)
-        return reading, now
 
     def _exact(self, to: Pose) -> bool:
         """Whether it surely ends at the goal, so that a look on its last bit of way is enough."""
@@ -158,8 +161,7 @@ class Hopping:
         """Whether it is known when the hops acted, and from where the last one goes."""
         if len(self.hops) > 1:
             last = self.hops[-1]
-            back = any(last.speeds[axis] * sign(last.ways[axis]) < -BACK_DEG_S for axis in (PAN, TILT))
-            if back:
+            if any(last.speeds[axis] * sign(last.ways[axis]) < -BACK_DEG_S for axis in (PAN, TILT)):
                 return False
         return self.latest <= LATEST * self.helm.skill.timing.spread
 

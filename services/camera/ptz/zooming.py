@@ -46,7 +46,7 @@ class Zooming:
 
     def _way(self) -> float:
         """How far zoom has to go, with its sign."""
-        return self.helm.zoom_aim() - self.helm.course.stopped(ZOOM, FOREVER)
+        return self.helm.zoom_aim() - self.helm.course.rests(ZOOM)
 
     def settle(self, now: float) -> Plan[float]:
         """Ends zoom where that is due before a look; where it surely missed it turns again."""
@@ -68,12 +68,12 @@ class Zooming:
         course = self.helm.course
         if not course.told[ZOOM] or course.levels[ZOOM]:
             return False
-        course.meet_end(ZOOM)
-        off = abs(self.helm.goal.pose[ZOOM] - course.stopped(ZOOM, FOREVER))
+        off = abs(self.helm.goal.pose[ZOOM] - course.rests(ZOOM))
         return off > self.helm.zoom_near + SURE * course.doubt(ZOOM, FOREVER)
 
     def begin(self) -> Plan[float]:
         """Starts zoom; it goes on. A way that is shorter than the smallest step begins the other way."""
+        self.helm.course.meet_end(ZOOM)
         way = self._way()
         level = sign(way) or 1
         if self.helm.least(ZOOM) - abs(way) > BEYOND * self.helm.zoom_near:
