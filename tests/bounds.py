@@ -12,7 +12,6 @@ PRESET_DEG = 2.0
 COMMANDS = 12  # for a goal, answers to login challenges not counted
 CORRECTION = 3  # more at the very most where a camera is calibrated: one more leg, and a reading
 CALIBRATED_WITHIN_COMMANDS = 0.995  # of the goals of a calibrated camera; two late answers in one move may cost more
-DITHERING_WITHIN_COMMANDS = 0.99  # where readings dither, which are to be nearer the goal then
 WITHIN_COMMANDS = 0.95  # of the goals at least; a first goal, or one with a late answer or two, takes more
 
 SCAN_OVER_LEAST = 1.3  # a full scan (both picture modes, K = 8) over the least time of motors, frames and one switch

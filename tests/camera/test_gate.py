@@ -158,11 +158,13 @@ def test_a_camera_that_refuses_good_logins_at_random_is_not_taken_for_a_wrong_pa
     assert visitors.get() == 200
 
 
-def test_where_a_good_login_was_ever_refused_two_refusals_prove_nothing_and_three_do() -> None:
+@pytest.mark.parametrize("before", [0, 1])
+def test_where_a_login_has_passed_two_refusals_prove_nothing_and_three_do(before: int) -> None:
+    """Whether a good one was ever refused before or not."""
     camera = Camera()
     visitors = Visitors(camera)
     visitors.get()
-    camera.odd = 1
+    camera.odd = before
     visitors.get()
     visitors.now += 3600.0
     camera.odd = 2  # both with a new nonce

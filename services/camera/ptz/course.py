@@ -5,6 +5,8 @@ Pure. Not here: what to tell it next (`leg.py`, `move.py`), what is known of its
 
 from __future__ import annotations
 
+from math import hypot
+
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import STOP_LATE, Seen, Told
 from services.camera.ptz.skill import ZOOM_SLOWS_S, Skill
@@ -31,6 +33,7 @@ class Course:
         self.shift = [0.0, 0.0, 0.0]  # what readings say beyond the model
         self.levels = [0, 0, 0]
         self.read_at = 0.0  # when the latest reading came
+        self._read: list[Seen | None] = [None, None, None]  # the latest, since it last stood
         self._zoom_at_rest: tuple[float, int] | None = None  # how it was read there, after so many commands
 
     def tell(self, reply: Reply, levels: tuple[int, int, int]) -> None:
@@ -81,16 +84,25 @@ class Course:
         for axis, told in enumerate(self.told):
             pace = self.skill.paces[axis]
             if told and told[-1].level == 0:
-                before = max((abs(one.level) for one in told), default=0)
-                last = abs(told[-2].level) if len(told) > 1 else before
-                slowing = max(ZOOM_SLOWS_S if axis == ZOOM else 0.0, pace.change(last))
+                slowing = max(ZOOM_SLOWS_S if axis == ZOOM else 0.0, pace.change(self.ended_from(axis)))
                 ends.append(told[-1].at + max(0.0, pace.other(STOP_LATE)) + slowing)
         return max(ends)
 
+    def ended_from(self, axis: int) -> int:
+        """The speed that an axis was ended from; 0: none."""
+        return abs(self.told[axis][-2].level) if len(self.told[axis]) > 1 else 0
+
     def doubt(self, axis: int, when: float) -> float:
-        """How far the model may be off at a time."""
-        pace = self.skill.paces[axis]
-        return pace.expected(self.told[axis], Seen(when, 0.0, 0.0, 0.0))[1]
+        """How far from where it is reckoned it may be: no farther than at the last reading, and on the way since."""
+        model, read = self.model_doubt(axis, when), self._read[axis]
+        if read is None:
+            return model
+        since = self.skill.paces[axis].apart(self.told[axis], read, Seen(when, 0.0, 0.0, 0.0, acts=True))
+        return min(model, hypot(read.noise, since))
+
+    def model_doubt(self, axis: int, when: float) -> float:
+        """The same by what is known of its motor alone."""
+        return self.skill.paces[axis].expected(self.told[axis], Seen(when, 0.0, 0.0, 0.0))[1]
 
     def read(self, reply: Reply, reading: Reading) -> None:
         """Takes in a reading."""
@@ -125,6 +137,7 @@ class Course:
             model = self.origin[axis] + pace.travel(told, pace.seen_at(reply.sent, late))
             own, read = timing**2 + 0.05**2, noise**2 + (TIME_S * 2 * speed) ** 2
             self.shift[axis] = (value - model) * own / (own + read)
+            self._read[axis] = seen._replace(noise=read**0.5)
 
     def _again(self, value: float, *, rests: bool) -> bool:
         """Whether zoom was read the same at this rest: its coarse reading once more tells nothing new."""
@@ -158,6 +171,7 @@ class Course:
         """The firmware drives on by itself: what was told is over, and where it leads will be read."""
         for told in self.told:
             told.clear()
+        self._read = [None, None, None]
         self.levels = [0, 0, 0]
         self.origin = pose
 
@@ -169,6 +183,7 @@ class Course:
             if self.told[axis]:
                 self.skill.paces[axis].age()
             self.told[axis].clear()
+            self._read[axis] = None
             self.shift[axis] = 0.0
         zoom = self.origin[ZOOM] if self.levels[ZOOM] else pose[ZOOM]
         self.origin = (pose[PAN], pose[TILT], zoom)

@@ -27,6 +27,7 @@ UNSURE_LEVELS = 0.1  # it is not said to stand at the very end, which it may jus
 WEIGHED_DEG_S, NOISE_DEG = 8.0, 0.1  # slower motions are always reckoned well
 LAST_DEG, LAST_DOUBT = 0.5, 0.5  # the last bit of way, of which a reading tells the rest; a share of it is doubted
 RESTS_S = 0.02  # after it is reckoned to rest, where the camera does not tell it
+LONGER = 0.4  # of the time that it brakes, that may be more: what few readings teach of it is surer than true
 SLACK = 2.0  # such doubts of the moment that a reading tells of
 SURPRISES = 0.2  # of what was known before is replaced by each rest
 DIRECTIONS = {direction.value: direction for direction in Direction}
@@ -129,7 +130,7 @@ class Helm:
                 reading = seen
                 break
         self.foretold = reading is not seen
-        rests = 0.0 if self.skill.tells_rest(seen.moving) else self._rests() + self._unsure(0.0) + RESTS_S
+        rests = 0.0 if self.skill.tells_rest(seen.moving) else self._rests() + self._longer() + RESTS_S
         if rests and self.driven is not None:
             rests = max(rests, zoom_drive.rests(self.skill, self.driven.zooming(self.skill)))
         if self.zoom_ends is not None:
@@ -244,6 +245,11 @@ class Helm:
     def _slows(self) -> float:
         """How much longer it may take to slow down than is reckoned, seconds."""
         return max(self.skill.paces[axis].other_doubt(HALF_CHANGE) * self._fastest(axis) for axis in (PAN, TILT))
+
+    def _longer(self) -> float:
+        """How much longer than is reckoned it may turn where nothing tells when it rests, seconds."""
+        brakes = (self.skill.paces[axis].change(self.course.ended_from(axis)) for axis in (PAN, TILT))
+        return self._unsure(0.0) + LONGER * max(brakes)
 
     def settled(self) -> float:
         """When a reading has to be asked for that shows everything at rest."""

@@ -253,7 +253,11 @@ class Hopping:
         course = self.helm.course
         pan, tilt = (
             Turned(
-                tuple(told), course.origin[axis] + course.shift[axis], course.doubt(axis, acted), reply.received, late
+                tuple(told),
+                course.origin[axis] + course.shift[axis],
+                course.model_doubt(axis, acted),
+                reply.received,
+                late,
             )
             for axis, told in enumerate(course.told[:ZOOM])
         )

@@ -130,6 +130,11 @@ class Pace:
         value, slope = self._slope(told, seen)
         return value, float(np.sqrt(slope @ self.cov @ slope))
 
+    def apart(self, told: Sequence[Told], one: Seen, other: Seen) -> float:
+        """The doubt about how far it goes from one moment to another."""
+        slope = self._slope(told, other)[1] - self._slope(told, one)[1]
+        return float(np.sqrt(slope @ self.cov @ slope))
+
     def learn(self, told: Sequence[Told], seen: Seen) -> None:
         """Takes in one reading. It may be of another time than is thought, but not where the axis rests: if it rests
         far from where it should, then what was thought to be known well is not.

@@ -41,7 +41,7 @@ def rush(helm: Helm, reaches: tuple[float, float], now: float, *, zooms: bool) -
     end = helm.course.origin[lead] + sign(way) * (held * rates[lead] + pace.change(level) * pace.rate(level) / 2)
     for early in (True, False):  # once soon, as long as the speed is not known, and once before the end
         ends = helm.course.end_for(lead, end, now)
-        unsure = helm.course.doubt(lead, ends) / rates[lead]
+        unsure = helm.course.model_doubt(lead, ends) / rates[lead]
         latest = ends - 2 * timing.usual - min(timing.tail, LATE_LOOK * timing.usual)
         look = max(now, latest - unsure)
         if latest < now or (early and pace.known(level)):

@@ -24,10 +24,11 @@ RUNGS = 5  # legs without a rest between them
 RECKONED_DEG = 0.4
 BESIDE_DEG = 0.2  # less is not worth to be put right
 LOST_DEG = 1.0  # as much doubt about the place of an axis that turns is usual
+ALSO_DEG, FREE_DEG = 0.15, 3.0  # so much nearer an axis is put right with the other; and so far from a stop
 SHARP_DEG = 0.05  # what a reckoning leaves open, at least
 ZOOM_COMMANDS = 1  # zoom's start is the end of a leg
 MANY_COMMANDS = 7  # after so many, a look has to be worth more
-FARTHER_DEG = 0.2  # than is reckoned an axis may be, for a look not to be had too late
+FARTHER_DEG = 0.25  # than is reckoned an axis may be, for a look not to be had too late
 ENOUGH_DEG = 0.4  # doubt about the place of an end that needs no look
 PROBE_S = 0.35  # seen in the readings
 PROBE_LONG_S = 1.5  # shows how fast it is, too, and is harmless the wrong way
@@ -92,7 +93,15 @@ class Turning:
         turned = [axis for axis in (PAN, TILT) if self.helm.course.told[axis]]
         if any(self.helm.reckoned(axis) > RECKONED_DEG for axis in turned):
             return []
-        return [axis for axis in turned if self._off(axis, now) > self.helm.near + SHARP_DEG]
+        off = {axis: self._off(axis, now) for axis in turned}
+        if not any(way > self.helm.near + SHARP_DEG for way in off.values()):
+            return []
+        near = self.helm.near + (-ALSO_DEG if self._free() else SHARP_DEG)
+        return [axis for axis in turned if off[axis] > near]
+
+    def _free(self) -> bool:
+        """Whether the goal is so far from all stops that a late end does no harm."""
+        return all(min(self.helm.room(axis, 1.0), self.helm.room(axis, -1.0)) > FREE_DEG for axis in (PAN, TILT))
 
     def _beside(self, now: float) -> list[int]:
         """The axes that rest beside the goal as far as is reckoned: while the other goes on, they can be put right."""

@@ -33,8 +33,8 @@ class Book:
     """What the gate knows, without clock and threads; times are seconds of any one clock.
 
     A camera that has just refused a login and then taken it (`ODD_WINDOW_S`) refuses at random: there three failures
-    prove less, so a few single tries follow at growing distances before it counts as a wrong password. Where that ever
-    happened, two refusals prove nothing: by chance alone they would shut everybody out every hour or two.
+    prove less, so a few single tries follow at growing distances before it counts as a wrong password. Where a login
+    has passed, two refusals prove nothing: by chance alone they would shut everybody out every few hours.
     """
 
     retry_s: float = RETRY_S
@@ -47,7 +47,7 @@ class Book:
     why: Literal["", "wrong", "locked", "odd"] = ""
     opens_at: float | None = None  # None: it is open
     closed_s: float = 0.0  # how long it was closed the last time
-    odd: bool = False  # a good login was refused at some time
+    good: bool = False  # this password was taken at some time
     odd_until: float = float("-inf")
 
     def closed(self, now: float) -> DeviceError | None:
@@ -91,7 +91,8 @@ class Book:
         """A login was accepted; it says nothing about those that failed after it was sent."""
         if number == self.ever:
             if self.failures and self.why != "locked":
-                self.odd, self.odd_until = True, now + ODD_WINDOW_S
+                self.odd_until = now + ODD_WINDOW_S
+            self.good = True
             self.failures, self.closings, self.why, self.opens_at = 0, 0, "", None
             self.unanswered = False
 
@@ -104,7 +105,7 @@ class Book:
                 self.close(now, "wrong")
             elif self.failures >= MOST_FAILURES:
                 self._shut(now, 2.0 ** (self.failures - MOST_FAILURES), "odd")
-        elif (sure and not self.odd) or self._counted >= MOST_FAILURES:
+        elif (sure and not self.good) or self._counted >= MOST_FAILURES:
             self.close(now, "wrong")
 
     def close(self, now: float, why: Literal["wrong", "locked"]) -> None:

@@ -62,8 +62,7 @@ def test_a_calibrated_camera_takes_few_commands_from_its_first_goal_on(name: str
     assert sum(commands > bounds.COMMANDS for commands in first) <= 1
     assert max(one.commands for one in found) <= bounds.COMMANDS + bounds.CORRECTION
     few = [one.commands <= bounds.COMMANDS for one in found]
-    within = bounds.DITHERING_WITHIN_COMMANDS if PROFILES[name].status_dither else bounds.CALIBRATED_WITHIN_COMMANDS
-    assert sum(few) >= within * len(few)
+    assert sum(few) >= bounds.CALIBRATED_WITHIN_COMMANDS * len(few)
     assert median(one.ratio for one in found) <= wanted(PROFILES[name], calibrated=True)
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 import pytest
 
-from services.camera.ptz.course import ZOOM, Course
+from services.camera.ptz.course import PAN, READ_DEG, ZOOM, Course
 from services.camera.ptz.drive import Drive, judge
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
@@ -52,6 +52,21 @@ def zoom_rate_after(rate: float, begun: float, turn: Direction, reading: float) 
     seen = Reading(0.0, 20.0, reading)
     course.read(Reply(Status(), 2, seen, None, 1001.5, 1001.8), seen)
     return skill.paces[ZOOM].rate(1)
+
+
+def test_a_reading_on_the_way_tells_where_it_is_however_little_was_known_of_the_way_to_there() -> None:
+    course = Course(LIMITS, Skill(), (-100.0, 20.0, 0.0))
+    course.skill.senses[PAN].sure = True
+    for level, answered in ((8, 1000.0), (1, 1002.0)):  # fast, and then slowly: what was fast is not told apart
+        course.tell(Reply(Start(Direction.RIGHT, level), 1, None, None, answered - 0.3, answered), (level, 0, 0))
+    asked = 1004.7
+    assert course.doubt(PAN, asked) == course.model_doubt(PAN, asked) > 10.0
+    seen = Reading(340.0, 20.0, 0.0)
+    course.read(Reply(Status(), 2, seen, None, asked, 1005.0), seen)
+    assert READ_DEG < course.doubt(PAN, asked) < 4 * READ_DEG < course.model_doubt(PAN, asked)
+    assert course.doubt(PAN, asked) < course.doubt(PAN, asked + 10.0) <= course.model_doubt(PAN, asked + 10.0)
+    course.stand(LIMITS.pose(seen))
+    assert course.doubt(PAN, 1015.0) == 0.0
 
 
 @pytest.mark.parametrize(
