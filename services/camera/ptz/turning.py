@@ -94,10 +94,10 @@ class Turning:
         if any(self.helm.reckoned(axis) > RECKONED_DEG for axis in turned):
             return []
         off = {axis: self._off(axis, now) for axis in turned}
-        if not any(way > self.helm.near + SHARP_DEG for way in off.values()):
-            return []
-        near = self.helm.near + (-ALSO_DEG if self._free() else SHARP_DEG)
-        return [axis for axis in turned if off[axis] > near]
+        beside = [axis for axis in turned if off[axis] > self.helm.near + SHARP_DEG]
+        if beside and self._free():
+            return [axis for axis in turned if off[axis] > self.helm.near - ALSO_DEG]
+        return beside
 
     def _free(self) -> bool:
         """Whether the goal is so far from all stops that a late end does no harm."""
