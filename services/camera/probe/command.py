@@ -114,3 +114,4 @@ def _say_files(out: Console, files: list[Path], camera: Target) -> None:
         f"The password belongs into the environment or secrets.yaml as {PASSWORD.format(camera.name.upper())}.",
         markup=False,
     )
+    out.print(f"When its service runs, `apartment calibrate ptz {camera.name}` shows it its motors.", markup=False)

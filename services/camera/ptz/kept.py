@@ -20,6 +20,7 @@ from services.whole_file import write_whole
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
+SHOW_THEM = "its first moves take longer, unless `apartment calibrate ptz {}` shows them to it"
 log = logging.getLogger(__name__)
 
 
@@ -62,7 +63,7 @@ class Kept:
     """One camera's file; without a folder nothing is kept."""
 
     def __init__(self, folder: Path | None, camera: str) -> None:
-        self.file = folder / "cameras" / f"{camera}.json" if folder else None
+        self.camera, self.file = camera, folder / "cameras" / f"{camera}.json" if folder else None
         self.identity: Identity | None = None
 
     def recall(self, identity: Identity, skill: Skill) -> None:
@@ -74,6 +75,8 @@ class Kept:
         if kept is not None and (kept.serial, kept.firmware) == (identity.serial, identity.version):
             _take_in(kept, skill)
             log.info("what was learnt of the motors of %s is known again", identity.serial)
+        else:
+            log.info("the motors of %s are not known yet: %s", identity.serial, SHOW_THEM.format(self.camera))
 
     def save(self, skill: Skill) -> None:
         """Writes it, at once as a whole."""

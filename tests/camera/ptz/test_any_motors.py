@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import random
 from dataclasses import replace
 from itertools import pairwise
@@ -157,6 +158,20 @@ def test_what_was_learnt_is_known_again_after_a_restart(tmp_path: Path) -> None:
     assert again.paces[0].rate(8) == pytest.approx(skill.paces[0].rate(8), abs=1e-6)
     assert again.senses[0] == skill.senses[0]
     assert again.timing.count == skill.timing.count
+
+
+def test_a_camera_whose_motors_are_not_known_says_what_would_show_them(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    identity, hint = Identity("M", "S1", "V1"), "`apartment calibrate ptz ip1`"
+    kept = Kept(tmp_path, "ip1")
+    kept.recall(identity, Skill())
+    assert hint in caplog.text
+    kept.save(Skill())
+    caplog.clear()
+    Kept(tmp_path, "ip1").recall(identity, Skill())
+    assert hint not in caplog.text
 
 
 def test_another_camera_or_another_firmware_is_learnt_anew(tmp_path: Path) -> None:
