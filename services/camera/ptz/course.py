@@ -133,6 +133,8 @@ class Course:
         again = axis == ZOOM and self._again(value, rests=not speed)
         if not again and (inside or farther):  # at an end it may have been stopped, having come at least so far
             pace.learn(told, seen)
+            if axis != ZOOM:
+                self.skill.paces[TILT if axis == PAN else PAN].agree(pace)
         if axis != ZOOM or not speed:
             model = self.origin[axis] + pace.travel(told, pace.seen_at(reply.sent, late))
             own, read = timing**2 + 0.05**2, noise**2 + (TIME_S * 2 * speed) ** 2

@@ -37,14 +37,14 @@ Levels = tuple[int, int, int]
 
 
 class Helm:
-    """One move. `commands` counts what was sent; `zoom_ends` is when to send what ends zoom, while it turns."""
+    """One move. `commands` counts what was sent, `stuck` legs without effect; `zoom_ends`: when to end zoom that turns."""
 
     def __init__(self, goal: Goal, limits: Limits, skill: Skill) -> None:
         self.goal, self.limits, self.skill = goal, limits, skill
         ends = zip(goal.pose[:ZOOM], limits.ranges, strict=False)
         pan, tilt = (min(high - EDGE_DEG, max(low + EDGE_DEG, value)) for value, (low, high) in ends)
         self.aim: Pose = (pan, tilt, goal.pose[ZOOM])
-        self.commands = 0
+        self.commands = self.stuck = 0
         self.turned: set[int] = {PAN, TILT}  # since it was last judged where they rest
         self.zoom_ends: float | None = None
         self.driven: Begun | None = None  # what the firmware drives by itself

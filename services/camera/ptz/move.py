@@ -73,7 +73,6 @@ class Move:
         self.turning = Turning(self.helm, self.zooming)
         self.driving = Driving(self.helm, presets)
         self.hopping = Hopping(self.helm)
-        self.stuck = 0
 
     def plan(self, near: Reading | None) -> Plan[Arrival]:
         """See `goto`."""
@@ -86,7 +85,7 @@ class Move:
                 out = self._out(reading)
             if not out and self.helm.zoom_ends is None:
                 return Arrival(reading, now, self.helm.goal.clamped, self.helm.rests)
-            if now > self.until or self.stuck >= STUCK:
+            if now > self.until or self.helm.stuck >= STUCK:
                 raise DeviceError(self._failed(reading, "in time" if now > self.until else "the camera does not turn"))
             before = self.helm.limits.pose(reading)
             driven = yield from self.driving.drive(reading, now)
@@ -144,9 +143,9 @@ class Move:
     def _notice(self, before: Pose, after: Pose, out: list[int]) -> None:
         """Counts legs without effect; zoom may turn without a change of its coarse reading."""
         if max(abs(b - a) for b, a in zip(before, after, strict=True)) > MOVED:
-            self.stuck = 0
+            self.helm.stuck = 0
         elif self.helm.zoom_ends is None and out:
-            self.stuck += 1
+            self.helm.stuck += 1
 
     def _failed(self, reading: Reading, why: str) -> str:
         pan, tilt, zoom = self.helm.goal.pose

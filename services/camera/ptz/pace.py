@@ -23,6 +23,7 @@ ZOOM_RATES = (3.0,)  # levels/s; there is one speed
 # how much later stops act than starts, the age of a reading (below 0: from before it was asked for), and how much of
 # an unusually long answer falls before a reading is taken, and after a command has acted.
 HALF_CHANGE, STOP_LATE, READ_LATE, READ_PART, ACT_PART = range(5)
+ANSWERS = (READ_LATE, READ_PART, ACT_PART)  # the same for all axes
 FIRST = (0.005, 0.0, 0.0, 0.4, 0.15)
 DOUBT = (0.006, 0.04, 0.12, 0.4, 0.2)
 LEAST = (0.0002, -0.3, -1.0, 0.0, 0.0)
@@ -167,6 +168,19 @@ class Pace:
             self.mean[number] = better.mean[other]
             self.cov[number, :] = self.cov[:, number] = 0.0
             self.cov[number, number] = better.cov[other, other]
+
+    def agree(self, other: Pace) -> None:
+        """Answers mean the same for all axes: takes over what another one has learnt of their timing.
+
+        What was learnt here of everything else together with it follows (Jeffrey's rule; exact, as the readings of two
+        axes have nothing else in common).
+        """
+        own, others = (np.array(ANSWERS) + len(pace.guess) for pace in (self, other))
+        known, better = self.cov[np.ix_(own, own)], other.cov[np.ix_(others, others)]
+        part = np.linalg.solve(known, self.cov[own, :]).T
+        self.mean = self.mean + part @ (other.mean[others] - self.mean[own])
+        self.cov = self.cov + part @ (better - known) @ part.T
+        self._keep_within()
 
     def suppose(self, rate: float, part: float, half_change: float) -> None:
         """Its one rate is known from elsewhere but for such a share, and how fast it changes speed, too."""

@@ -166,9 +166,14 @@ class Turning:
             room = self.helm.room(axis, distance)
             doubt = self.helm.course.doubt(axis, now) if self.helm.course.told[axis] else 0.0
             room -= 2 * max(0.0, doubt - LOST_DEG)
-            fastest = self.helm.fastest(axis, abs(distance) + room) if self._runs_to(axis, distance) else inf
-            ways[axis] = Way(distance, room, self.helm.skill.paces[axis], self.helm.near, fastest)
+            ways[axis] = Way(distance, room, self.helm.skill.paces[axis], self.helm.near, self._fastest(axis, distance, room))
         return ways
+
+    def _fastest(self, axis: int, distance: float, room: float) -> float:
+        """The rate that it may begin with: after a leg too short for its motor to get going, the lowest there is."""
+        if self._runs_to(axis, distance):
+            return self.helm.fastest(axis, abs(distance) + room)
+        return 0.0 if self.helm.stuck else inf
 
     def _runs_to(self, axis: int, distance: float) -> bool:
         """Whether an axis turns already, the right way."""
