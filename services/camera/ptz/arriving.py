@@ -100,7 +100,8 @@ class Arriving:
     def _there(self) -> bool:
         goes = self.hops and self.seen[-1].moving is True and not self.helm.skill.always_moving
         near = self.certain and self._off <= NEARER_DEG and self._zoomed(self.seen[-1])
-        return near and (self._rests or not (self.about or goes))
+        unsure = self.about or goes or not zoom_drive.sure(self.helm.skill, self.zooming)
+        return near and (self._rests or not unsure)
 
     @property
     def _beside(self) -> bool:
@@ -117,11 +118,7 @@ class Arriving:
     def _rested(self, reply: Reply) -> float:
         """When all rests, at the latest, that was seen on its last bit of way."""
         skill = self.helm.skill
-        if all(map(self._zoomed, self.seen)):
-            zoom = zoom_drive.rests(skill, self.zooming)
-        else:
-            zoom = zoom_drive.rests_late(skill, self.zooming, reply.sent)
-        return max(zoom, rests_by(skill, self._off, reply))
+        return max(zoom_drive.rests(skill, self.zooming), rests_by(skill, self._off, reply))
 
 
 def rests_by(skill: Skill, off: float, reply: Reply) -> float:

@@ -17,7 +17,7 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told
-from services.camera.ptz.skill import Skill
+from services.camera.ptz.skill import NEARER_DEG, Skill
 from services.camera.requests import GotoPreset, MoveTo, Reply
 
 ABSOLUTE: tuple[Literal["PositionABS", "moveAbsolutely"], ...] = ("PositionABS", "moveAbsolutely")
@@ -53,6 +53,13 @@ class Begun:
     def arrives(self, skill: Skill) -> float:
         """When it should be there, as far as is known by now."""
         return self.reply.received + longest(skill, self.here, self.drive.to)
+
+    def ends(self, skill: Skill, seen: Pose, when: float, zoom_near: float) -> bool:
+        """Whether a reading shows it on its last bit of way, and tilt, which was ended when it began, at rest."""
+        tilt, to = skill.paces[TILT], self.drive.to
+        rests = self.reply.received + tilt.change(tilt.speeds[-1])
+        there = abs(seen[PAN] - to[PAN]) <= NEARER_DEG and abs(seen[ZOOM] - to[ZOOM]) <= zoom_near
+        return there and when > rests and zoom_drive.sure(skill, self.zooming(skill))
 
     def look(self, skill: Skill, reply: Reply, seen: Pose) -> None:
         """What a look tells of its speed, on the axes that do not slow down yet; `seen`: its reading as a pose."""

@@ -37,7 +37,7 @@ Levels = tuple[int, int, int]
 
 
 class Helm:
-    """One move. `commands` counts what was sent, `stuck` legs without effect; `zoom_ends`: when to end zoom that turns."""
+    """One move. `commands` counts what was sent, `stuck` legs without effect; `zoom_ends`: when to end a zoom."""
 
     def __init__(self, goal: Goal, limits: Limits, skill: Skill) -> None:
         self.goal, self.limits, self.skill = goal, limits, skill
@@ -135,7 +135,10 @@ class Helm:
             rests = max(rests, zoom_drive.rests(self.skill, self.driven.zooming(self.skill)))
         if self.zoom_ends is not None:
             self.time_zoom(reply.received)
-        self._place_zoom(reading)
+        if self.driven is None:
+            self._place_zoom(reading)
+        else:
+            self.skill.lead_zoom(reading.zoom, self.driven.drive.to[ZOOM])
         self.driven = None
         self.stand(reading)
         return reading, (yield from wait(max(reply.received, rests)))
@@ -166,6 +169,8 @@ class Helm:
         pace, late = self.skill.paces[PAN], self.skill.timing.late(reply)
         when, moves = pace.seen_at(reply.sent, late), self._moves(seen) and self.zoom_ends is None
         slack = self._unsure(late)
+        if moves and self.driven is not None and self.driven.ends(self.skill, self.pose(seen), when, self.zoom_near):
+            return replace(seen, moving=None)
         if seen.moving is False or self.quiet or any(self.course.levels[:2]) or when > self.course.rests_at() + slack:
             return None if moves else seen
         pose, left = self.limits.pose(seen), [0.0, 0.0]
@@ -269,10 +274,6 @@ class Helm:
             reckoned = self.course.stopped(ZOOM, FOREVER)
             off = min(high - UNSURE_LEVELS, max(low + UNSURE_LEVELS, reckoned)) - reading.zoom
             self.skill.zoomed = (reading.zoom, reading.zoom + (off if abs(off) <= half else sign(off) * half / 2))
-
-    def least(self, axis: int) -> float:
-        """The smallest step: a start, and its end as soon as it was answered."""
-        return self.skill.paces[axis].rate(1) * self.skill.timing.usual
 
     def zoom_aim(self) -> float:
         """Where zoom should end: a late end does no harm there, and its coarse reading is the goal's."""

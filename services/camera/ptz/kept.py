@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from services.camera.ptz.pace import Pace
 from services.camera.ptz.planes import Planes
 from services.camera.ptz.skill import KEEP, Honours, RelativeForm, Sense, Skill
+from services.camera.ptz.zoom_rate import ZoomRate
 from services.camera.requests import Identity
 from services.whole_file import write_whole
 
@@ -52,6 +53,7 @@ class _Kept(BaseModel):
     steady: int = 0
     diagonals: bool
     zoom_steps: list[float]
+    zoom_rate: Pair | None = None
     honours: dict[str, Honours]
     beside: dict[str, Pair]
     presets: dict[int, Triple]
@@ -128,6 +130,7 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
         steady=skill.steady,
         diagonals=skill.diagonals,
         zoom_steps=skill.zoom_steps,
+        zoom_rate=skill.zoom_rate.known(),
         honours=skill.honours,
         beside=skill.beside,
         presets=skill.presets,
@@ -171,5 +174,7 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
     skill.timing.count, skill.timing.worst = kept.count, kept.worst
     skill.surprise, skill.arrives_late = kept.surprise, kept.arrives_late
     skill.steady = kept.steady
+    if kept.zoom_rate is not None:
+        skill.zoom_rate = ZoomRate(*kept.zoom_rate)
     skill.diagonals, skill.zoom_steps, skill.honours = kept.diagonals, kept.zoom_steps, kept.honours
     skill.beside, skill.presets = kept.beside, kept.presets

@@ -13,6 +13,7 @@ from typing import Literal
 
 from services.camera.ptz.pace import HALF_CHANGE, PAN_RATES, READ_LATE, TILT_RATES, ZOOM_RATES, Pace
 from services.camera.ptz.planes import POINT, TURN, VIEW, Scale, scale_of
+from services.camera.ptz.zoom_rate import ZoomRate
 from services.camera.requests import Reply
 
 RelativeForm = Literal["moveRelatively", "Position"]
@@ -31,7 +32,7 @@ STILL_DEG = 0.05
 STEADY = 6  # readings at rest that were alike show that they do not dither
 LEVEL = 1.0  # zoom is read in coarse steps: a reading may be so far from the truth
 ZOOM_SLOWS_S = 0.1  # zoom takes so long to its speed, and to rest
-ZOOM_DOUBT = 0.1  # of DRIVES' zoom, at first
+ZOOM_DOUBT, ZOOM_UNSURE = 0.1, 0.5  # of DRIVES' zoom, at first: for when to look, and for when it surely rests
 OTHER_PART = 0.06  # of the top speed: the firmware's own moves may be as much faster, or slower
 STEP_LONGER = 1.5  # than is reckoned
 GRIDS = (2.0, 1.0)  # some firmware tells zoom in coarse steps
@@ -116,6 +117,7 @@ class Skill:
     zoom_steps: list[float] = field(default_factory=list)  # readings of zoom between its ends
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
     drives: tuple[Pace, Pace, Pace] = field(default_factory=_drives)
+    zoom_rate: ZoomRate = field(default_factory=lambda: ZoomRate(DRIVES[2], ZOOM_UNSURE))  # how slow that may be
     arrives_late: float = 0.02  # s after it is reckoned there, to look whether a drive has ended
     honours: dict[str, Honours] = field(default_factory=dict)  # by form
     beside: dict[str, tuple[float, float]] = field(default_factory=dict)  # by form: pan and tilt off what was asked
@@ -148,7 +150,13 @@ class Skill:
         part = hypot(told.doubt(top) / told.rate(top), OTHER_PART)
         if part < own.doubt(1) / own.rate(1):
             own.suppose(told.rate(top), part, told.other(HALF_CHANGE))
+            if axis == 2 and part < self.zoom_rate.known()[1]:
+                self.zoom_rate = ZoomRate(told.rate(top), part)
         return own
+
+    def least(self, axis: int) -> float:
+        """The smallest step: a start, and its end as soon as it was answered."""
+        return self.paces[axis].rate(1) * self.timing.usual
 
     @property
     def step_s(self) -> float:

@@ -139,7 +139,7 @@ class Turning:
         """Where even the smallest step is too long, it begins the other way; the leg then turns it round."""
         levels = [0, 0, 0]
         for axis in axes if self.helm.skill.diagonals else axes[:1]:
-            distance, least = self.helm.aim[axis] - self.helm.course.stopped(axis, now), self.helm.least(axis)
+            distance, least = self.helm.aim[axis] - self.helm.course.stopped(axis, now), self.helm.skill.least(axis)
             if least - abs(distance) > self.helm.near:
                 levels[axis] = -sign(distance)
         if any(levels):
@@ -166,7 +166,9 @@ class Turning:
             room = self.helm.room(axis, distance)
             doubt = self.helm.course.doubt(axis, now) if self.helm.course.told[axis] else 0.0
             room -= 2 * max(0.0, doubt - LOST_DEG)
-            ways[axis] = Way(distance, room, self.helm.skill.paces[axis], self.helm.near, self._fastest(axis, distance, room))
+            ways[axis] = Way(
+                distance, room, self.helm.skill.paces[axis], self.helm.near, self._fastest(axis, distance, room)
+            )
         return ways
 
     def _fastest(self, axis: int, distance: float, room: float) -> float:

@@ -5,16 +5,17 @@ It is read in coarse steps: a reading tells of it at the edge of a step only, an
 
 from __future__ import annotations
 
-from math import inf
+from math import hypot, inf
 from typing import cast
 
 from services.camera.ptz.course import PAN, ZOOM
 from services.camera.ptz.glide import Glide
-from services.camera.ptz.pace import Seen, Told
+from services.camera.ptz.pace import READ_LATE, READ_PART, Seen, Told
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Reading, Reply
 
-SLOWEST = 2.0  # standard deviations that it may be slower than is known
+SLOWER = 0.01  # it may last longer than that, for all that is known
+SURE = 0.4  # of its rate may be in doubt
 NOISE_LEVELS = 0.5  # of where it was on its way, at the edge of a step of its reading
 
 
@@ -31,6 +32,11 @@ def see(skill: Skill, glide: Glide, reply: Reply) -> None:
     half = skill.zoom_step / 2
     if way <= half or glide.began >= reply.sent:
         return
+    reads, late = skill.paces[PAN], timing.late(reply)
+    seconds = reads.seen_at(reply.sent, late) - glide.began
+    doubt = hypot(reads.other_doubt(READ_LATE), reads.other_doubt(READ_PART) * late)
+    if seconds > 0:
+        skill.zoom_rate.see(seconds, seen - half if seen else -inf, seen + half if seen < way else inf, doubt)
     pace.borrow(skill.paces[PAN])
     told = [Told(glide.began, 0.0, 1)]
     low, high = seen - half, inf if seen > way - half - NOISE_LEVELS else seen + half
@@ -41,20 +47,15 @@ def see(skill: Skill, glide: Glide, reply: Reply) -> None:
         pace.age()
 
 
+def sure(skill: Skill, glide: Glide) -> bool:
+    """Whether it is known so well how fast it is that nobody needs to look whether it rests."""
+    return glide.goal == glide.place or skill.zoom_rate.known()[1] < SURE
+
+
 def rests(skill: Skill, glide: Glide) -> float:
     """When it rests at the latest, as far as its speed is known by now."""
-    pace, way = skill.drive(ZOOM), abs(glide.goal - glide.place)
-    slowest = max(pace.rate(1) / 2, pace.rate(1) - SLOWEST * pace.doubt(1))
-    return glide.began + (way / slowest + pace.change(1) if way else 0.0)
-
-
-def rests_late(skill: Skill, glide: Glide, seen: float) -> float:
-    """The same where it was slower than is known: it is read to be there, and was not in the look before that.
-
-    It was seen as soon as it was nearer than half a step: that takes as long in proportion as the way before it.
-    """
-    way, half = abs(glide.goal - glide.place), skill.zoom_step / 2
-    return seen + (seen - glide.began) * half / max(half, way - half) + skill.drive(ZOOM).change(1)
+    way = abs(glide.goal - glide.place)
+    return glide.began + (skill.zoom_rate.lasts(way, SLOWER) if way else 0.0)
 
 
 def shown(skill: Skill, glide: Glide, sent: float, since: float) -> bool:

@@ -16,7 +16,8 @@ from services.camera.ptz.pace import Pace
 
 RATES = np.geomspace(0.8, 12.0, 904)  # levels/s, three in a thousand apart
 SLOWS_S = np.arange(0.0, 0.65, 0.025)[:, None]  # from rest to that rate
-LEAST_DOUBT, DOUBTS = 0.05, 3.0  # of a rate before the first look, at least; times what was doubted before
+OFTEN_S = 0.1  # that takes so long
+KEPT = 0.99  # of what looks told, with each one more
 NOISE_LEVELS, NOISE_S = 0.03, 0.006  # of where a step begins; of the moment that a look tells of
 ODD = 0.01  # of the looks tell nothing
 EXACT = 0.003  # of the rate stays in doubt
@@ -27,28 +28,43 @@ Grid = NDArray[np.float64]
 class ZoomRate:
     """What is known of one way to let zoom go: by start and stop, or by the firmware's own moves."""
 
-    def __init__(self, pace: Pace) -> None:
-        doubt = max(LEAST_DOUBT, DOUBTS * pace.doubt(1) / pace.rate(1))
-        before = np.exp(-np.square(np.log(RATES / pace.rate(1)) / doubt) / 2)
-        self._likely: Grid = before * np.ones_like(SLOWS_S)  # [seconds to its rate; rate]
+    def __init__(self, rate: float, doubt: float) -> None:
+        """A guess, and which share of it is doubted: one standard deviation."""
+        before = np.exp(-np.square(np.log(RATES / rate) / doubt) / 2)
+        self._likely: Grid = before * np.exp(-SLOWS_S / OFTEN_S)  # [seconds to its rate; rate]
 
     def comes(self, ways: Iterable[float], after: float) -> float | None:
         """When it has probably come the next of some ways, seconds from its beginning; None: all are behind it."""
         times = (self._mean(way / RATES + SLOWS_S / 2) for way in ways)
         return next((when for when in times if when > after), None)
 
-    def see(self, seconds: float, low: float, high: float) -> None:
-        """It was seen to have come so far from rest in so many seconds, levels: at least, and at most."""
+    def see(self, seconds: float, low: float, high: float, doubt: float = 0.0) -> None:
+        """It was seen to have come so far from rest in so many seconds, levels: at least, and at most.
+
+        `doubt`: standard deviation of the seconds.
+        """
+        self._likely = (self._likely / self._likely.max()) ** KEPT
         gains = np.minimum(seconds, SLOWS_S)
         way = RATES * (gains * gains / (2 * np.maximum(SLOWS_S, 1e-6)) + seconds - gains)
-        noise = np.hypot(NOISE_LEVELS, NOISE_S * RATES)
+        noise = np.hypot(NOISE_LEVELS, np.hypot(NOISE_S, doubt) * RATES)
         self._likely *= ODD + (1 - ODD) * (_below((high - way) / noise) - _below((low - way) / noise))
+
+    def lasts(self, way: float, part: float) -> float:
+        """How long a way takes from rest to rest, levels and seconds; longer in so small a part of all that fits."""
+        seconds = (way / RATES + SLOWS_S).ravel()
+        longest = np.argsort(-seconds)
+        likely = np.cumsum(self._likely.ravel()[longest])
+        return float(seconds[longest[np.searchsorted(likely, part * likely[-1])]])
+
+    def known(self) -> tuple[float, float]:
+        """The rate, and which share of it is doubted."""
+        rate = self._mean(RATES)
+        return rate, max(EXACT, self._mean(np.square(RATES - rate)) ** 0.5 / rate)
 
     def teach(self, pace: Pace) -> None:
         """Hands on the rate, its doubt, and how fast zoom changes its speed."""
-        rate = self._mean(RATES)
-        doubt = self._mean(np.square(RATES - rate)) ** 0.5
-        pace.suppose(rate, max(EXACT, doubt / rate), self._mean(SLOWS_S) / (2 * rate))
+        rate, doubt = self.known()
+        pace.suppose(rate, doubt, self._mean(SLOWS_S) / (2 * rate))
 
     def _mean(self, values: Grid) -> float:
         return float((self._likely * values).sum() / self._likely.sum())

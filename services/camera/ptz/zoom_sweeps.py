@@ -22,8 +22,9 @@ from services.camera.ptz.stand import settle, stop
 from services.camera.ptz.zoom_rate import ZoomRate
 from services.camera.requests import Direction, MoveOver, Reading, Reply, Request, Start, Status
 
-SWEEPS = 16  # from end to end
+SWEEPS = 15  # from end to end
 LOOKS = 20  # at one of them
+LEAST_DOUBT, DOUBTS = 0.05, 3.0  # of its rate before the first look, at least; times what was doubted before
 SPARE = 1.2  # of a way by the relative form, so that the end is met exactly
 
 
@@ -31,13 +32,14 @@ def sweep(limits: Limits, skill: Skill) -> Plan[float]:
     """Learns the rate of zoom; it is left at an end of its range. Returns when that was."""
     own = not isinstance(_request(limits, skill, (0.0, 0.0, limits.zoom[0]), limits.zoom[1]), Start)
     pace = skill.drive(ZOOM) if own else skill.paces[ZOOM]
-    known = ZoomRate(pace)
+    known = ZoomRate(pace.rate(1), max(LEAST_DOUBT, DOUBTS * pace.doubt(1) / pace.rate(1)))
     for number in range(1 + SWEEPS):  # the first one begins anywhere
         now, there = yield from _once(limits, skill, known, limits.zoom[number % 2])
         if not there:
             return now
     known.teach(pace)
     if own:
+        skill.zoom_rate = known
         part = hypot(pace.doubt(1) / pace.rate(1), OTHER_PART)
         skill.paces[ZOOM].suppose(pace.rate(1), part, pace.other(HALF_CHANGE))
     return now

@@ -76,7 +76,7 @@ class Zooming:
         self.helm.course.meet_end(ZOOM)
         way = self._way()
         level = sign(way) or 1
-        if self.helm.least(ZOOM) - abs(way) > BEYOND * self.helm.zoom_near:
+        if self.helm.skill.least(ZOOM) - abs(way) > BEYOND * self.helm.zoom_near:
             yield from self.helm.start((0, 0, -level))
         now = (yield from self.helm.start((0, 0, level))).received
         self.helm.time_zoom(now)

@@ -133,7 +133,8 @@ def test_a_drive_of_the_firmware_that_takes_much_longer_than_usual_is_followed_t
     assert not any(isinstance(request, Start) for request in motors.sent)
 
 
-@pytest.mark.parametrize("seed", [3, 4, 5, 76])  # in 76 it brakes for longer than all that was read of it tells
+# In 76 it brakes for longer than all that was read of it tells, in 82 a short leg does not get it going at all.
+@pytest.mark.parametrize("seed", [3, 4, 5, 76, 82])
 def test_two_readings_in_a_moment_do_not_show_a_camera_at_rest(seed: int) -> None:
     """From a camera that answers in hundredths of a second they are equal while it turns slowly."""
     motors = Motors(latency=0.02, jitter=0.005, says="nothing", acceleration=40.0, seed=seed)

@@ -6,13 +6,14 @@ import random
 from copy import deepcopy
 from typing import Literal
 
+import numpy as np
 import pytest
 
 from services.camera.ptz.course import PAN, READ_DEG, ZOOM, Course
 from services.camera.ptz.drive import Drive, judge
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
-from services.camera.ptz.pace import PAN_RATES, Pace, Seen, Told
+from services.camera.ptz.pace import PAN_RATES, READ_LATE, TILT_RATES, Pace, Seen, Told, taught
 from services.camera.ptz.skill import Skill
 from services.camera.requests import Direction, MoveTo, Reading, Reply, Start, Status
 from tests.camera.motors import Motors, drive
@@ -130,3 +131,20 @@ def test_two_readings_that_dither_do_not_make_what_was_known_forgotten(off: floa
     told = [Told(1000.0, 0.0, 1), Told(1001.5, 0.0, 0)]
     pace.learn(told, Seen(1010.0, 0.0, pace.travel(told, 1010.0) + off, 0.08))
     assert (pace.doubt(8) > 0.05 * pace.rate(8)) is forgotten
+
+
+def test_what_another_axis_learns_of_answers_is_as_if_it_was_seen_here() -> None:
+    """Exactly so: readings of two axes have nothing in common but the moment that they tell of."""
+    pan, tilt, direct = Pace(PAN_RATES), Pace(TILT_RATES), Pace(TILT_RATES)
+    told = [Told(1000.0, 0.0, 5)]
+    for pace in (tilt, direct):
+        pace.learn(told, Seen(1001.0, 0.1, pace.travel(told, 1001.0) + 1.0, 0.1))
+    pan.agree(tilt)
+    for pace in (pan, direct):
+        slope = np.zeros(len(pace.mean))
+        slope[len(pace.guess) + READ_LATE] = 1.0
+        pace.mean, pace.cov = taught(pace.mean, pace.cov, slope, 0.05, 0.03)
+    tilt.agree(pan)
+    assert tilt.mean == pytest.approx(direct.mean, abs=1e-9)
+    assert tilt.cov == pytest.approx(direct.cov, abs=1e-9)
+    assert tilt.rate(5) != pytest.approx(TILT_RATES[4], rel=0.01)

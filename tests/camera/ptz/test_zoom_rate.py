@@ -43,7 +43,7 @@ def thought(rate: float, doubt: float) -> Pace:
 @pytest.mark.parametrize("slows", [0.05, 0.3])
 @pytest.mark.parametrize("rate", [1.5, 2.7, 4.0, 6.0])
 def test_a_few_sweeps_tell_how_fast_it_is_and_how_long_that_takes(rate: float, slows: float, step: float) -> None:
-    known, pace, rng = ZoomRate(thought(4.0, 0.3)), thought(4.0, 0.3), random.Random(7)
+    known, pace, rng = ZoomRate(4.0, 0.9), thought(4.0, 0.3), random.Random(7)
     looks = [sweep(known, rng, rate, slows, step) for _ in range(12)]
     known.teach(pace)
     assert pace.rate(1) == pytest.approx(rate, rel=0.02)
@@ -57,7 +57,7 @@ def test_the_doubt_it_tells_is_the_doubt_there_is() -> None:
     for seed in range(30):
         rng = random.Random(seed)
         rate, slows, pace = rng.uniform(1.5, 6.0), rng.uniform(0.05, 0.15), thought(4.0, 0.3)
-        known = ZoomRate(pace)
+        known = ZoomRate(4.0, 0.9)
         for _ in range(6):
             sweep(known, rng, rate, slows, 2.0)
         known.teach(pace)
@@ -67,7 +67,7 @@ def test_the_doubt_it_tells_is_the_doubt_there_is() -> None:
 
 
 def test_a_look_that_tells_of_another_moment_does_not_spoil_it() -> None:
-    known, pace, rng = ZoomRate(thought(4.0, 0.3)), thought(4.0, 0.3), random.Random(3)
+    known, pace, rng = ZoomRate(4.0, 0.9), thought(4.0, 0.3), random.Random(3)
     for number in range(12):
         sweep(known, rng, 2.7, 0.1, 2.0)
         if number == 3:
@@ -77,8 +77,20 @@ def test_a_look_that_tells_of_another_moment_does_not_spoil_it() -> None:
 
 
 def test_when_it_comes_a_way_is_what_is_thought_and_behind_it_nothing_comes() -> None:
-    known = ZoomRate(thought(4.0, 0.02))
+    known = ZoomRate(4.0, 0.06)
     comes = known.comes([1.0, 3.0], 0.5)
     assert comes is not None
     assert 0.75 < comes < 1.2  # 3 levels at 4 levels/s, from rest
     assert known.comes([1.0, 3.0], 1.5) is None
+
+
+def test_a_way_hardly_ever_lasts_longer_than_it_says() -> None:
+    longer = []
+    for seed in range(60):
+        rng = random.Random(seed)
+        known, rate, slows = ZoomRate(4.0, 0.5), rng.uniform(1.5, 6.0), rng.uniform(0.05, 0.15)
+        for _ in range(1 + seed % 3):
+            sweep(known, rng, rate, slows, 2.0)
+            longer.append(RANGE / rate + slows > known.lasts(RANGE, 0.02))
+    assert sum(longer) <= 0.05 * len(longer)
+    assert known.lasts(RANGE, 0.02) < 1.1 * (RANGE / rate + slows)  # and it does not say any time
