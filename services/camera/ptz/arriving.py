@@ -40,6 +40,7 @@ class Arriving:
     about: float = 0.0
     hops: bool = False
     seen: list[Reading] = field(default_factory=list, init=False)
+    now: float = field(default=0.0, init=False)  # when that came
     since: float = field(default=FOREVER, init=False)  # the latest reading is the same since then
 
     def at_rest(self, arrives: float, now: float) -> Plan[tuple[Reading, float, bool]]:
@@ -65,6 +66,7 @@ class Arriving:
     def _look(self) -> Plan[Reply]:
         reply = yield from self.helm.send(Status())
         self.seen.append(cast(Reading, reply.result))
+        self.now = reply.received
         again = len(self.seen) > 1 and same(self.seen[-2], self.seen[-1])
         self.since = self.since if again else reply.sent
         self.helm.skill.says_late |= again and self.seen[-2].moving is True
@@ -100,7 +102,7 @@ class Arriving:
     def _there(self) -> bool:
         goes = self.hops and self.seen[-1].moving is True and not self.helm.skill.always_moving
         near = self.certain and self._off <= NEARER_DEG and self._zoomed(self.seen[-1])
-        unsure = self.about or goes or not zoom_drive.sure(self.helm.skill, self.zooming)
+        unsure = self.about or goes or not zoom_drive.sure(self.helm.skill, self.zooming, self.now)
         return near and (self._rests or not unsure)
 
     @property

@@ -59,7 +59,7 @@ class Begun:
         tilt, to = skill.paces[TILT], self.drive.to
         rests = self.reply.received + tilt.change(tilt.speeds[-1])
         there = abs(seen[PAN] - to[PAN]) <= NEARER_DEG and abs(seen[ZOOM] - to[ZOOM]) <= zoom_near
-        return there and when > rests and zoom_drive.sure(skill, self.zooming(skill))
+        return there and when > rests and zoom_drive.sure(skill, self.zooming(skill), when)
 
     def look(self, skill: Skill, reply: Reply, seen: Pose) -> None:
         """What a look tells of its speed, on the axes that do not slow down yet; `seen`: its reading as a pose."""

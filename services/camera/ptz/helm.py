@@ -117,7 +117,7 @@ class Helm:
         now = yield from wait(max(now, self.settled()))
         self.rests = self._rests()
         reply, seen, reading = yield from self._look()
-        since = reply.sent
+        since, at_once = reply.sent, reading is not None
         while reading is None or (
             self.zoom_ends is None and (pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading))
         ):
@@ -139,6 +139,7 @@ class Helm:
             self._place_zoom(reading)
         else:
             self.skill.lead_zoom(reading.zoom, self.driven.drive.to[ZOOM])
+            self.skill.expect_arrival(there=at_once)
         self.driven = None
         self.stand(reading)
         return reading, (yield from wait(max(reply.received, rests)))
@@ -258,10 +259,9 @@ class Helm:
 
     def settled(self) -> float:
         """When a reading has to be asked for that shows everything at rest."""
-        pace = self.skill.paces[PAN]
-        doubt = pace.other_doubt(READ_LATE) + self._slows()
-        if self.quiet:  # otherwise what is seen on its last bit of way tells the rest, too
-            doubt += pace.other(READ_PART) * self.skill.timing.spread / 2  # one that comes too soon says that it moves
+        if self.quiet:
+            return self._rests() - self.skill.read_late + self.skill.arrives_late
+        doubt = self.skill.paces[PAN].other_doubt(READ_LATE) + self._slows()
         return self._rests() - self.skill.read_late + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:

@@ -47,9 +47,9 @@ def see(skill: Skill, glide: Glide, reply: Reply) -> None:
         pace.age()
 
 
-def sure(skill: Skill, glide: Glide) -> bool:
-    """Whether it is known so well how fast it is that nobody needs to look whether it rests."""
-    return glide.goal == glide.place or skill.zoom_rate.known()[1] < SURE
+def sure(skill: Skill, glide: Glide, now: float) -> bool:
+    """Whether nobody needs to look whether it rests: that is over, or it is known well enough how fast it is."""
+    return rests(skill, glide) <= now or skill.zoom_rate.known()[1] < SURE
 
 
 def rests(skill: Skill, glide: Glide) -> float:

@@ -14,6 +14,7 @@ from services.camera.ptz.goal import Limits
 from services.camera.ptz.kept import Kept
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
+from services.camera.ptz.zoom_rate import ZoomRate
 from services.camera.requests import Identity, MoveTo, Reply, Start, Status
 from tests.camera.motors import Motors, drive
 
@@ -149,7 +150,7 @@ def test_two_readings_in_a_moment_do_not_show_a_camera_at_rest(seed: int) -> Non
 
 def test_what_was_learnt_is_known_again_after_a_restart(tmp_path: Path) -> None:
     folder, identity = tmp_path, Identity("M", "S1", "V1")
-    motors, skill = Motors(acceleration=90.0), Skill()
+    motors, skill = Motors(acceleration=90.0), Skill(zoom_rate=ZoomRate(2.0, 0.1))
     drive(goto(LIMITS.goal(10.0, 60.0, 0.0), LIMITS, skill, 1060.0), motors)
     kept = Kept(folder, "ip1")
     kept.recall(identity, skill)
@@ -159,6 +160,7 @@ def test_what_was_learnt_is_known_again_after_a_restart(tmp_path: Path) -> None:
     assert again.paces[0].rate(8) == pytest.approx(skill.paces[0].rate(8), abs=1e-6)
     assert again.senses[0] == skill.senses[0]
     assert again.timing.count == skill.timing.count
+    assert again.zoom_rate.known() == pytest.approx(skill.zoom_rate.known(), rel=0.05)
 
 
 def test_a_camera_whose_motors_are_not_known_says_what_would_show_them(

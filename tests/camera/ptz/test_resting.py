@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from services.camera.ptz.skill import Skill
+from services.camera.requests import MoveTo, Request, Status
 from services.simulators.camera.firmwares import PROFILES
 from tests import bounds
 from tests.camera.goals import LIMITS, Rig, random_goals
@@ -37,6 +38,23 @@ def test_that_a_rest_was_foretold_a_little_wrong_is_not_taken_for_dither(name: s
         rig.go(goal)
         rig.now += 1.0
     assert rig.skill.dithers == rig.profile.status_dither
+
+
+def test_where_the_firmware_ends_pan_itself_one_look_on_its_last_bit_of_way_is_enough() -> None:
+    rig, ends = Rig(PROFILES["dahua-pan-only"], 1), []
+    rig.calibrate()
+    for goal in random_goals(bounds.GOALS, 1):
+        sent: list[Request] = []
+        rig.log = lambda reply, sent=sent: sent.append(reply.request)  # type: ignore[misc]
+        outcome = rig.go(goal)
+        assert outcome.rests
+        assert outcome.off <= bounds.OFF_DEG
+        driven = [number for number, request in enumerate(sent) if isinstance(request, MoveTo)]
+        if driven and all(isinstance(request, Status) for request in sent[driven[-1] + 1 :]):
+            ends.append(len(sent) - driven[-1] - 1)
+        rig.now += 1.0
+    assert len(ends) > bounds.GOALS / 2
+    assert sum(looks == 1 for looks in ends) >= 0.9 * len(ends)
 
 
 def test_a_camera_that_was_taken_for_one_that_always_says_it_moves_is_believed_again_when_it_says_it_rests() -> None:
