@@ -40,7 +40,7 @@ class Arriving:
     about: float = 0.0
     hops: bool = False
     seen: list[Reading] = field(default_factory=list, init=False)
-    now: float = field(default=0.0, init=False)  # when that came
+    now: float = field(default=0.0, init=False)  # when the latest came
     since: float = field(default=FOREVER, init=False)  # the latest reading is the same since then
 
     def at_rest(self, arrives: float, now: float) -> Plan[tuple[Reading, float, bool]]:
@@ -100,10 +100,14 @@ class Arriving:
 
     @property
     def _there(self) -> bool:
-        goes = self.hops and self.seen[-1].moving is True and not self.helm.skill.always_moving
         near = self.certain and self._off <= NEARER_DEG and self._zoomed(self.seen[-1])
-        unsure = self.about or goes or not zoom_drive.sure(self.helm.skill, self.zooming, self.now)
-        return near and (self._rests or not unsure)
+        return near and (self._rests or self._goes_there)
+
+    @property
+    def _goes_there(self) -> bool:
+        """Whether what may still turn surely ends there."""
+        goes_on = self.hops and self.seen[-1].moving is True and not self.helm.skill.always_moving
+        return not self.about and not goes_on and zoom_drive.sure(self.helm.skill, self.zooming, self.now)
 
     @property
     def _beside(self) -> bool:

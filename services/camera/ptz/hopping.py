@@ -135,8 +135,8 @@ class Hopping:
             ends = landing.ends(helm.skill, self.glides, doubts, reply, helm.limits.pose(reading))
             landing.stray(self._scale, self.glides, doubts, ends)
             zoomed = abs(helm.goal.pose[ZOOM] - reading.zoom) <= helm.zoom_near or not self._takes_zoom()
-            zoomed = zoomed and zoom_drive.sure(helm.skill, self.zooming, now)
-            verdict = landing.judge(helm.aim, helm.near, ends) if zoomed else "unsure"
+            sure = zoomed and zoom_drive.sure(helm.skill, self.zooming, now)
+            verdict = landing.judge(helm.aim, helm.near, ends) if sure else "unsure"
             if verdict == "unsure":
                 break
             landing.learn(helm.skill, self.form, self.hops, self.glides, helm.limits, reading, ends)

@@ -167,11 +167,11 @@ class Turning:
             doubt = self.helm.course.doubt(axis, now) if self.helm.course.told[axis] else 0.0
             room -= 2 * max(0.0, doubt - LOST_DEG)
             ways[axis] = Way(
-                distance, room, self.helm.skill.paces[axis], self.helm.near, self._fastest(axis, distance, room)
+                distance, room, self.helm.skill.paces[axis], self.helm.near, self._begins_at(axis, distance, room)
             )
         return ways
 
-    def _fastest(self, axis: int, distance: float, room: float) -> float:
+    def _begins_at(self, axis: int, distance: float, room: float) -> float:
         """The rate that it may begin with: after a leg too short for its motor to get going, the lowest there is."""
         if self._runs_to(axis, distance):
             return self.helm.fastest(axis, abs(distance) + room)

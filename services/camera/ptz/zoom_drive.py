@@ -27,20 +27,20 @@ def begin(skill: Skill, here: float, to: float, acted: float) -> Glide:
 
 def see(skill: Skill, glide: Glide, reply: Reply) -> None:
     """What a look shows of it on its way from rest: its speed, or where it has arrived, that it is no slower."""
-    pace, timing, way = skill.drive(ZOOM), skill.timing, abs(glide.goal - glide.place)
+    pace, way = skill.drive(ZOOM), abs(glide.goal - glide.place)
     seen = abs(cast(Reading, reply.result).zoom - glide.place)
     half = skill.zoom_step / 2
     if way <= half or glide.began >= reply.sent:
         return
-    reads, late = skill.paces[PAN], timing.late(reply)
+    reads, late = skill.paces[PAN], skill.timing.late(reply)
     seconds = reads.seen_at(reply.sent, late) - glide.began
     doubt = hypot(reads.other_doubt(READ_LATE), reads.other_doubt(READ_PART) * late)
     if seconds > 0:
         skill.zoom_rate.see(seconds, seen - half if seen else -inf, seen + half if seen < way else inf, doubt)
-    pace.borrow(skill.paces[PAN])
+    pace.borrow(reads)
     told = [Told(glide.began, 0.0, 1)]
     low, high = seen - half, inf if seen > way - half - NOISE_LEVELS else seen + half
-    shown = Seen(reply.sent, timing.late(reply), seen, NOISE_LEVELS)
+    shown = Seen(reply.sent, late, seen, NOISE_LEVELS)
     expected, _ = pace.expected(told, shown)
     if not low <= expected <= high:
         pace.learn(told, shown._replace(travel=min(high, max(low, expected))))
@@ -49,7 +49,7 @@ def see(skill: Skill, glide: Glide, reply: Reply) -> None:
 
 def sure(skill: Skill, glide: Glide, now: float) -> bool:
     """Whether nobody needs to look whether it rests: that is over, or it is known well enough how fast it is."""
-    return rests(skill, glide) <= now or skill.zoom_rate.known()[1] < SURE
+    return skill.zoom_rate.known()[1] < SURE or rests(skill, glide) <= now
 
 
 def rests(skill: Skill, glide: Glide) -> float:
