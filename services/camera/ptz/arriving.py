@@ -14,13 +14,13 @@ from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import PAIR_S, Helm
 from services.camera.ptz.pace import HALF_CHANGE, READ_LATE
-from services.camera.ptz.skill import NEARER_DEG, Skill
+from services.camera.ptz.skill import NEARER_DEG, THERE_DEG, Skill
 from services.camera.requests import Reading, Reply, Status
 
 FEW = 3  # commands left
 LOOKS = 30  # less and less often
 LONG_S = 2.0  # apart, at most
-THERE_DEG = 0.15  # what is farther off is on its last bit of way
+GOOD, MOST = 1.4, 2.0  # of what should be left of that: it was not looked at too soon; more tells nothing
 NEWER, NEWEST_S = 2.0, 0.1  # standard deviations that a reading may be newer than is known, and at most
 READ_DEG, LONGER = 0.1, 1.3  # of a reading; than is reckoned an axis may take to slow down
 
@@ -30,7 +30,8 @@ class Arriving:
     """One such end. `to`: where it leads; `zooming`: the way of zoom; `certain`: it is known exactly where that leads.
 
     `about`: that is not known quite exactly, but so few degrees; there one look is enough if it tells of rest. `hops`:
-    it may be beyond its end and return, so it is not there while it says that it moves.
+    it may be beyond its end and return, so it is not there while it says that it moves. `left`: where the firmware is
+    known to end where it should, so much of the way may be left.
     """
 
     helm: Helm
@@ -39,50 +40,59 @@ class Arriving:
     certain: bool
     about: float = 0.0
     hops: bool = False
+    left: float = 0.0
     seen: list[Reading] = field(default_factory=list, init=False)
+    arrives: float = field(default=0.0, init=False)  # when it should rest
     now: float = field(default=0.0, init=False)  # when the latest came
+    when: float = field(default=0.0, init=False)  # what that tells of
     since: float = field(default=FOREVER, init=False)  # the latest reading is the same since then
 
-    def at_rest(self, arrives: float, now: float) -> Plan[tuple[Reading, float, bool]]:
-        """Looks from about then on.
+    def at_rest(self, arrives: float, now: float, nears: float | None = None) -> Plan[tuple[Reading, float, bool]]:
+        """Looks from about then on; `nears`: when no more than `left` of the way should be left.
 
         Returns the reading, when it rests, and whether that surely shows the camera at rest.
         """
-        skill = self.helm.skill
+        skill, self.arrives = self.helm.skill, arrives
         late = max(skill.arrives_late, skill.timing.spread if self.helm.left <= FEW else 0.0)  # none of those too soon
-        yield from wait(max(now, arrives - skill.read_late + late))
+        yield from wait(max(now, (arrives if nears is None else nears) - skill.read_late + late))
         for _ in range(LOOKS):
             reply = yield from self._look()
             if self._there or self._beside or self._still(reply.sent):
                 break
             yield from wait(reply.sent + min(LONG_S, PAIR_S * (len(self.seen) - 1)))
         if self.certain and (self._there or not same(self.seen[0], self.seen[-1])):
-            skill.expect_arrival(there=len(self.seen) == 1 and self._off <= max(THERE_DEG, self.about))
+            skill.expect_arrival(there=len(self.seen) == 1 and self._off <= self._good)
         still = self._still(reply.sent)
         if still or skill.tells_rest(self.seen[-1].moving):
             return self.seen[-1], reply.received, self._rests or still
-        return self._last(reply, arrives), (yield from wait(max(reply.received, self._rested(reply)))), self._rests
+        return self._last, (yield from wait(max(reply.received, self._rested(reply)))), self._rests
 
     def _look(self) -> Plan[Reply]:
         reply = yield from self.helm.send(Status())
         self.seen.append(cast(Reading, reply.result))
         self.now = reply.received
+        self.when = self.helm.skill.paces[PAN].seen_at(reply.sent, self.helm.skill.timing.late(reply))
         again = len(self.seen) > 1 and same(self.seen[-2], self.seen[-1])
         self.since = self.since if again else reply.sent
         self.helm.skill.says_late |= again and self.seen[-2].moving is True
         zoom_drive.see(self.helm.skill, self.zooming, reply)
         return reply
 
-    def _last(self, reply: Reply, arrives: float) -> Reading:
+    @property
+    def _last(self) -> Reading:
         """The reading of the rest: where one tells of a moment before that, it surely goes on to its end.
 
         Whether it moves there nobody has told.
         """
-        skill, seen = self.helm.skill, self.seen[-1]
-        over = skill.paces[PAN].seen_at(reply.sent, skill.timing.late(reply)) >= arrives
-        if over or self._rests or not self._there or self._off <= THERE_DEG:
+        seen = self.seen[-1]
+        if self.when >= self.arrives or self._rests or not self._there or self._off <= THERE_DEG:
             return seen
         return replace(seen, pan=round(self.to[PAN] % 360.0, 2), tilt=round(self.to[TILT], 2), moving=None)
+
+    @property
+    def _good(self) -> float:
+        """So near, and at the first look, it was not looked at too soon."""
+        return max(THERE_DEG, self.about, GOOD * self.left)
 
     @property
     def _off(self) -> float:
@@ -100,8 +110,14 @@ class Arriving:
 
     @property
     def _there(self) -> bool:
-        near = self.certain and self._off <= NEARER_DEG and self._zoomed(self.seen[-1])
+        near = self.certain and self._near and self._zoomed(self.seen[-1])
         return near and (self._rests or self._goes_there)
+
+    @property
+    def _near(self) -> bool:
+        """Whether pan and tilt are where they should be, or on a last bit of way that leads there."""
+        turns = self.when < self.arrives and not self.helm.skill.tells_rest(self.seen[-1].moving)
+        return self._off <= NEARER_DEG or (turns and self._off <= MOST * self.left)
 
     @property
     def _goes_there(self) -> bool:

@@ -52,7 +52,11 @@ class Begun:
 
     def arrives(self, skill: Skill) -> float:
         """When it should be there, as far as is known by now."""
-        return self.reply.received + longest(skill, self.here, self.drive.to)
+        return self.nears(skill, 0.0)
+
+    def nears(self, skill: Skill, left: float) -> float:
+        """When no more than so many degrees of pan and tilt should be left, and all of zoom be done."""
+        return self.reply.received + longest(skill, self.here, self.drive.to, left)
 
     def ends(self, skill: Skill, seen: Pose, when: float, zoom_near: float) -> bool:
         """Whether a reading shows it on its last bit of way, and tilt, which was ended when it began, at rest."""
@@ -110,18 +114,19 @@ def _preset(pose: Pose, aim: Pose, limits: Limits, presets: Mapping[int, tuple[f
     return None
 
 
-def seconds(pace: Pace, distance: float) -> float:
-    """How long the firmware needs for one axis, from rest to rest."""
+def seconds(pace: Pace, distance: float, left: float = 0.0) -> float:
+    """How long the firmware needs for one axis, from rest to rest, or until so little is left while it slows down."""
     rate, slow = pace.rate(1), 2 * pace.other(HALF_CHANGE)
+    last = sqrt(2 * slow * min(left, distance / 2))
     if distance < slow * rate * rate:
-        return 2 * sqrt(distance * slow)
-    return distance / rate + slow * rate
+        return 2 * sqrt(distance * slow) - last
+    return distance / rate + slow * rate - last
 
 
-def longest(skill: Skill, here: Pose, there: Pose) -> float:
-    """How long the firmware needs for all axes."""
+def longest(skill: Skill, here: Pose, there: Pose, left: float = 0.0) -> float:
+    """How long the firmware needs for all axes; or until so many degrees of pan and tilt are left."""
     ways = (abs(b - a) for a, b in zip(here, there, strict=True))
-    pan, tilt, zoom = (seconds(skill.drive(axis), way) for axis, way in enumerate(ways))
+    pan, tilt, zoom = (seconds(skill.drive(axis), way, 0.0 if axis == ZOOM else left) for axis, way in enumerate(ways))
     return max(pan, tilt, zoom + ZOOM_LATE_S if zoom else 0.0)
 
 

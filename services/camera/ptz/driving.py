@@ -15,6 +15,8 @@ from services.camera.requests import Reading, Refused, Reply, Request, Status
 
 MOST_DRIVES = 4  # in one move
 TRY_LEFT = 7  # commands; with fewer nothing new is tried
+EXACT = 3  # of its moves in a row ended where they should: then it is known where the next one ends,
+LEFT_DEG = 0.75  # and a look is enough while so much of it should be left
 LONG_S = 2.0  # a drive that takes longer is looked at on the way, which costs no time
 
 
@@ -61,9 +63,13 @@ class Driving:
             now = reply.received
             drive.look(skill, reply, self.helm.limits.pose(cast(Reading, reply.result)))
             arrives = drive.arrives(skill)
-        end = Arriving(self.helm, way.to, drive.zooming(skill), own.certain(skill, way))
-        reading, now, rests = yield from end.at_rest(arrives, now)
+        left = LEFT_DEG if skill.exact >= EXACT and own.honoured(skill, way) else 0.0
+        end = Arriving(self.helm, way.to, drive.zooming(skill), own.certain(skill, way), left=left)
+        reading, now, rests = yield from end.at_rest(arrives, now, drive.nears(skill, left))
         self.helm.rests = arrives
+        skill.foretold = way.to if reading is not end.seen[-1] else None
+        if end.certain and skill.foretold is None:
+            skill.ended(self.helm.limits.pose(reading), way.to)
         there = self.helm.limits.pose(reading) if rests else way.to  # one on its last bit of way teaches nothing
         own.judge(skill, here, way, there)
         skill.lead_zoom(reading.zoom, way.to[ZOOM])

@@ -50,6 +50,7 @@ class _Kept(BaseModel):
     worst: float
     surprise: float
     arrives_late: float
+    exact: int = 0
     steady: int = 0
     diagonals: bool
     zoom_steps: list[float]
@@ -127,6 +128,7 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
         worst=skill.timing.worst,
         surprise=skill.surprise,
         arrives_late=skill.arrives_late,
+        exact=skill.exact,
         steady=skill.steady,
         diagonals=skill.diagonals,
         zoom_steps=skill.zoom_steps,
@@ -173,7 +175,7 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
         skill.timing.learn(kept.took[-1])
     skill.timing.count, skill.timing.worst = kept.count, kept.worst
     skill.surprise, skill.arrives_late = kept.surprise, kept.arrives_late
-    skill.steady = kept.steady
+    skill.steady, skill.exact = kept.steady, kept.exact
     if kept.zoom_rate is not None:
         skill.zoom_rate = ZoomRate(*kept.zoom_rate)
     skill.diagonals, skill.zoom_steps, skill.honours = kept.diagonals, kept.zoom_steps, kept.honours

@@ -113,6 +113,8 @@ class Move:
             self.helm.commands += 2
         else:
             reading, now = near, (yield from wait(0.0))
+            if self.helm.skill.foretold is not None and near.moving is not None:
+                self.helm.skill.ended(self.helm.limits.pose(near), self.helm.skill.foretold)
             self.helm.foretold = near.moving is None
         self.helm.stand(reading)
         return reading, now

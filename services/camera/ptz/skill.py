@@ -27,6 +27,7 @@ LATE_PART = 0.85  # of how late an answer may be, where a motion that it begins 
 FORGETS, WORSE = 0.998, 1.2  # of the latest answer: kept with each one more; and it may be later the next time
 SOONER_S, LATER_S, MOST_LATE_S = 0.008, 0.04, 0.5
 NEAR_DEG, NEARER_DEG = 0.42, 0.35  # a reading so near has arrived: 0.5 promised, resolution and dither taken off
+THERE_DEG = 0.15  # what is farther off than so is not quite where it should be
 DITHER_DEG = 0.1  # a reading at rest may be so far off where they dither
 STILL_DEG = 0.05
 STEADY = 6  # readings at rest that were alike show that they do not dither
@@ -118,6 +119,8 @@ class Skill:
     zoomed: tuple[float, float] | None = None  # reading, and the true value behind it
     drives: tuple[Pace, Pace, Pace] = field(default_factory=_drives)
     zoom_rate: ZoomRate = field(default_factory=lambda: ZoomRate(DRIVES[2], ZOOM_UNSURE))  # how slow that may be
+    exact: int = 0  # moves by the firmware, in a row, that ended where they should
+    foretold: tuple[float, float, float] | None = None  # where the latest surely ends, and nobody has read it there
     arrives_late: float = 0.02  # s after it is reckoned there, to look whether a drive has ended
     honours: dict[str, Honours] = field(default_factory=dict)  # by form
     beside: dict[str, tuple[float, float]] = field(default_factory=dict)  # by form: pan and tilt off what was asked
@@ -210,6 +213,11 @@ class Skill:
         """Takes in a reading of zoom: whether they come in steps shows between the ends."""
         if reading not in ends and reading not in self.zoom_steps:
             self.zoom_steps = [*self.zoom_steps[-7:], reading]
+
+    def ended(self, there: tuple[float, float, float], to: tuple[float, float, float]) -> None:
+        """A move by the firmware was read at its end: whether that is where it should be."""
+        exact = max(abs(there[axis] - to[axis]) for axis in (0, 1)) <= THERE_DEG
+        self.exact, self.foretold = self.exact + 1 if exact else 0, None
 
     def lead_zoom(self, reading: float, to: float) -> None:
         """The firmware drove zoom there by itself: so it stands there, unless its reading is of another step."""

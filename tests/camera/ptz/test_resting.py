@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import islice
+from typing import cast
+
 import pytest
 
 from services.camera.ptz.skill import Skill
-from services.camera.requests import MoveTo, Request, Status
+from services.camera.requests import MoveTo, Reading, Request, Status
 from services.simulators.camera.firmwares import PROFILES
 from tests import bounds
-from tests.camera.goals import LIMITS, Rig, random_goals
+from tests.camera.goals import LIMITS, Goal, Outcome, Rig, random_goals
 
 NAMES = ("ip3m-941w-2019", "ip4m-1051b-2019", "ip3m-943b")  # the second says for ever that it moves; the last dithers
 
@@ -55,6 +58,39 @@ def test_where_the_firmware_ends_pan_itself_one_look_on_its_last_bit_of_way_is_e
         rig.now += 1.0
     assert len(ends) > bounds.GOALS / 2
     assert sum(looks == 1 for looks in ends) >= 0.9 * len(ends)
+
+
+@pytest.mark.parametrize("name", ["ip4m-1041b", "2020s-dahua"])
+def test_where_the_firmware_ends_where_it_should_one_look_on_its_last_degree_is_enough(name: str) -> None:
+    rig, early = Rig(PROFILES[name], 1), 0
+    rig.calibrate()
+    for goal in random_goals(bounds.GOALS, 1):
+        outcome, off = _went(rig, goal)
+        early += off > bounds.OFF_DEG
+        assert outcome.rests
+        assert outcome.off <= bounds.OFF_DEG
+    assert early > bounds.GOALS / 10
+
+
+def test_after_one_did_not_stay_where_it_should_have_ended_moves_are_looked_at_to_their_end_again() -> None:
+    rig, goals = Rig(PROFILES["ip4m-1041b"], 1), iter(random_goals(bounds.GOALS, 1))
+    rig.calibrate()
+    assert any(_went(rig, goal)[1] > bounds.OFF_DEG for goal in goals)
+    rig.client.send(MoveTo(90.0, 45.0, 0.0, "PositionABS"))  # by somebody else, with the camera's own page
+    rig.now += 10.0
+    rig.near = cast(Reading, rig.client.send(Status()))  # as the service polls it
+    assert max(_went(rig, goal)[1] for goal in islice(goals, 3)) <= bounds.OFF_DEG
+    assert any(_went(rig, goal)[1] > bounds.OFF_DEG for goal in goals)
+
+
+def _went(rig: Rig, goal: Goal) -> tuple[Outcome, float]:
+    """One goal, and how far from its rest the camera was in the last look at it, degrees."""
+    seen: list[Reading] = []
+    rig.log = lambda reply: seen.append(reply.result) if isinstance(reply.result, Reading) else None
+    outcome = rig.go(goal)
+    rig.now += 1.0
+    (pan, tilt, _), truth = LIMITS.pose(seen[-1]), rig.truth()
+    return outcome, max(abs(pan - LIMITS.unwrap(truth[0])), abs(tilt - truth[1]))
 
 
 def test_a_camera_that_was_taken_for_one_that_always_says_it_moves_is_believed_again_when_it_says_it_rests() -> None:
