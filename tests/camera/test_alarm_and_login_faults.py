@@ -97,6 +97,31 @@ def test_a_silent_event_stream_is_noticed_although_the_camera_is_well(here: Benc
     here.until(lambda: motion(here) == 0, NOTICED_S)
 
 
+def test_firmware_without_heartbeat_keeps_one_event_stream_however_long_nothing_happens(tmp_path: Path) -> None:
+    with simulator(latency_s=0.02, switches={"heartbeat": False}) as camera, bench(tmp_path, camera, **QUICK) as here:
+        here.until(lambda: "no heartbeat" in here.service.motion.fact, NOTICED_S)
+        for_a_while(here, NOTICED_S)
+        assert sum("attach" in entry["target"] and entry["status"] == 200 for entry in log(here)) == 2
+        here.tell("event", code="VideoMotion", action="Start")
+        here.until(lambda: motion(here) == 1, 2)
+        here.tell("event", code="VideoMotion", action="Stop")
+        here.tell("fault", name="hang")
+        here.tell("drop")
+        here.until(lambda: motion(here) == -1, NOTICED_S)
+        here.tell("well")
+        here.until(lambda: motion(here) == 0, WELL_S)
+
+
+def test_a_heartbeat_that_came_late_is_relied_on_like_any(tmp_path: Path, camera: simulated.Simulated) -> None:
+    camera.server.faults.silent_events = True
+    with bench(tmp_path, camera, **QUICK) as here:
+        here.until(lambda: "no heartbeat" in here.service.motion.fact, NOTICED_S)
+        here.tell("well")
+        here.until(lambda: here.service.motion.fact == "attached", NOTICED_S)
+        here.tell("fault", name="silent_events")
+        here.until(lambda: motion(here) == -1, NOTICED_S)
+
+
 def test_a_slow_camera_stays_usable_and_its_latency_is_told(here: Bench) -> None:
     here.tell("fault", name="slow", seconds=1.0)
     for_a_while(here, 6.0)

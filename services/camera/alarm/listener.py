@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from services.bus import Message
-from services.camera.requests import BadLogin, Event
+from services.camera.requests import Away, BadLogin, Event
 from services.camera.web.endless import Silent
 from services.errors import DeviceError
 from services.runner import Post
@@ -26,8 +26,11 @@ log = logging.getLogger(__name__)
 class Ear(Protocol):
     """What a brand offers: the camera's events."""
 
-    def listen(self) -> Iterator[list[Event]]:
-        """Attaches, yields an empty list then, and what comes; DeviceError when that ends or is not to be had."""
+    def listen(self, *, patient: bool) -> Iterator[list[Event]]:
+        """Attaches, yields an empty list then, and what comes; DeviceError when that ends or is not to be had.
+
+        `patient`: nothing may come for long, since there is no heartbeat.
+        """
         ...
 
     def close(self) -> None:
@@ -54,6 +57,7 @@ class Listener:
 
     def __init__(self, name: str, ear: Ear, post: Post, clock: Callable[[], float] = time.time) -> None:
         self._ear, self._post, self._clock = ear, post, clock
+        self._beats = self._mute = False  # a heartbeat came; none did, and nothing else, for as long as some would have
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"{name} events", daemon=True)
         self._thread.start()
@@ -75,6 +79,7 @@ class Listener:
                 lost, least = str(error), error.again_s
             except Silent as error:
                 lost, silent = str(error), True
+                self._mute = not self._beats
             except DeviceError as error:
                 lost = str(error)
             if self._closing.is_set():
@@ -84,13 +89,16 @@ class Listener:
             self._closing.wait(max(pause, least))
 
     def _listen(self) -> None:
-        attached = False
-        for events in self._ear.listen():
+        attached, patient = False, self._mute and not self._beats
+        for events in self._ear.listen(patient=patient):
             if self._closing.is_set():
                 return
+            self._beats |= any(not event.code for event in events)
             if events or not attached:
                 self._tell(Heard(self._clock(), tuple(events), attached=not attached))
             attached = True
+            if patient and self._beats:
+                raise Away("it has a heartbeat after all, and is watched by that from now on")
 
     def _tell(self, heard: Heard) -> None:
         self._post(Message(HEARD, value=heard, received=heard.at))

@@ -5,7 +5,7 @@
     Stop     ──> still 1 for `hold_s`, then 0
     no Stop within `hold_s` ──> the camera is asked: it may have been lost, or somebody is still there
     lost     ──> -1 after `GRACE_S`; at once when it had fallen silent, and then until there is a sign of life
-    mute (firmware without heartbeat: silence proves nothing) ──> the camera is asked every `MUTE_ASK_S`
+    mute (firmware without heartbeat: silence proves nothing) ──> the camera is asked every `MUTE_ASK_S`, too
 
 Not here: the connection (`listener.py`).
 """
@@ -42,7 +42,8 @@ class MotionWatch:
         self.masked = 0  # events that were the camera's own doing
         self.reconnects = 0
         self._attached = False
-        self._mute = self._silent = False
+        self._silent = False
+        self._mute = False  # a silence has shown that this firmware has no heartbeat
         self._beats = False  # a heartbeat has come: from now on silence proves something
         self._trouble_at: float | None = None  # when to say so; None: there is none
         self._why = "not attached yet"
@@ -57,9 +58,9 @@ class MotionWatch:
         """How it fares, for the diagnostics."""
         if not self.on:
             return "off"
-        if self._mute:
+        if self._mute and self._trouble_at is None:
             return "asked every few seconds: this firmware has no heartbeat"
-        if not self._attached:
+        if self._mute or not self._attached:
             return f"lost: {self._why}"
         return "attached" if self._beats else "attached, no heartbeat yet"
 
@@ -71,8 +72,9 @@ class MotionWatch:
     def take(self, heard: Heard) -> None:
         """What the listener posts."""
         if heard.events:
-            self._mute = self._silent = False
+            self._silent = False
             self._beats |= any(not event.code for event in heard.events)
+            self._mute &= not self._beats
         if heard.attached:
             self._attached, self._asked_at = True, NEVER
         if self._attached and not self._silent:
@@ -119,16 +121,16 @@ class MotionWatch:
     def _lose(self, heard: Heard) -> None:
         was, self._attached = self._attached, False
         self.reconnects += was
-        self._mute, self._why = heard.silent and not self._beats, heard.lost or ""
-        self._silent = heard.silent and self._beats
-        if self._mute:
+        self._mute |= heard.silent and not self._beats
+        self._silent, self._why = heard.silent and self._beats, heard.lost or ""
+        if self._mute and heard.silent:
             self._trouble_at = None
         elif self._trouble_at is None:
             self._trouble_at = heard.at + (GRACE_S if was and not heard.silent else 0.0)
 
     def _wants_to_ask(self, now: float) -> bool:
-        if self._mute:
-            return now - self._asked_at >= MUTE_ASK_S
+        if self._mute:  # while the camera turns an answer would count for nothing
+            return now - self._asked_at >= MUTE_ASK_S and now - self._turned_at >= MASK_S
         if not self._attached:
             return False
         if self._asked_at == NEVER:
@@ -147,8 +149,11 @@ class MotionWatch:
         if reply.error is not None:
             self._active = False
             if self._mute:
-                self._mute, self._why, self._trouble_at = False, str(reply.error), reply.received
-        elif reply.result:
+                self._why, self._trouble_at = str(reply.error), reply.received
+            return
+        if self._mute:
+            self._trouble_at = None
+        if reply.result:
             self._moves(reply.received, lasting=True)
         else:
             self._active = False

@@ -22,6 +22,7 @@ from services.camera.web.gate import Gate
 from services.camera.web.upload import upload
 
 BEATS = 3.25  # so many heartbeats of silence are the end: three were missed, and one may be late
+PATIENT_S = 3600.0  # where there is no heartbeat: firmware that does not notice who has gone runs out of connections
 SOUND_SILENCE_S = 6.0
 RECEIVE = "/cgi-bin/audio.cgi?action=getAudio&httptype=singlepart&channel=1"  # 1-based whatever the motors want
 SEND = "/cgi-bin/audio.cgi?action=postAudio&httptype=singlepart&channel=1"
@@ -35,9 +36,9 @@ class DahuaEar:
         self._endless = Endless(address, gate, BEATS * heartbeat_s)
         self._target = events.attach(codes, heartbeat_s)
 
-    def listen(self) -> Iterator[list[Event]]:
+    def listen(self, *, patient: bool) -> Iterator[list[Event]]:
         """See `Ear`. After a refusal the next attempt spells its brackets the other way."""
-        with self._endless.open(self._target) as (response, pieces):
+        with self._endless.open(self._target, PATIENT_S if patient else None) as (response, pieces):
             try:
                 _must_be_endless(response)
             except Refused:

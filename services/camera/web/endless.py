@@ -28,10 +28,15 @@ KEEP_ALIVE = (
 
 
 class Endless:
-    """One connection for one endless answer at a time; `silence_s` without a byte ends it."""
+    """One connection for one endless answer at a time; `silence_s` without a byte ends it.
+
+    `patience_s`, where it is given, instead once the answer has begun: it may be silent while all is well. That the
+    other end is gone the kernel notices.
+    """
 
     def __init__(self, address: Address, gate: Gate, silence_s: float) -> None:
         self._login = Login(address.user, address.password, gate)
+        self._silence_s = silence_s
         self._http = httpx.Client(
             base_url=address.url,
             auth=self._login,
@@ -42,19 +47,20 @@ class Endless:
         self._socket: socket.socket | None = None
 
     @contextmanager
-    def open(self, target: str) -> Iterator[tuple[httpx.Response, Iterator[bytes]]]:
+    def open(self, target: str, patience_s: float | None = None) -> Iterator[tuple[httpx.Response, Iterator[bytes]]]:
         """The answer's head and its bytes; Away when there is none or it breaks, Silent when nothing more comes."""
-        begun = False
+        begun, silence_s = False, patience_s or self._silence_s
         try:
             with self._http.stream("GET", target) as response:
                 self._socket = _socket_of(response)
                 begun = True
+                response.request.extensions["timeout"]["read"] = silence_s  # of what is read from now on
                 if response.status_code != 200 or response.headers.get("content-type", "").startswith("text/"):
                     response.read()  # a refusal
                 yield response, response.iter_raw()
         except httpx.ReadTimeout as error:
             kind = Silent if begun else Away
-            raise kind(f"nothing came for {self._http.timeout.read:g} s") from error
+            raise kind(f"nothing came for {silence_s if begun else self._silence_s:g} s") from error
         except httpx.HTTPError as error:
             raise Away(f"the connection broke: {type(error).__name__} {error}".strip()) from error
         finally:
