@@ -31,7 +31,8 @@ class Arriving:
 
     `about`: that is not known quite exactly, but so few degrees; there one look is enough if it tells of rest. `hops`:
     it may be beyond its end and return, so it is not there while it says that it moves. `left`: where the firmware is
-    known to end where it should, so much of the way may be left.
+    known to end where it should, so much of the way may be left. `ended`: tilt does not go there, but rests from then
+    on.
     """
 
     helm: Helm
@@ -41,6 +42,7 @@ class Arriving:
     about: float = 0.0
     hops: bool = False
     left: float = 0.0
+    ended: float = 0.0
     seen: list[Reading] = field(default_factory=list, init=False)
     arrives: float = field(default=0.0, init=False)  # when it should rest
     now: float = field(default=0.0, init=False)  # when the latest came
@@ -87,7 +89,8 @@ class Arriving:
         seen = self.seen[-1]
         if self.when >= self.arrives or self._rests or not self._there or self._off <= THERE_DEG:
             return seen
-        return replace(seen, pan=round(self.to[PAN] % 360.0, 2), tilt=round(self.to[TILT], 2), moving=None)
+        tilt = seen.tilt if self.ended else round(self.to[TILT], 2)
+        return replace(seen, pan=round(self.to[PAN] % 360.0, 2), tilt=tilt, moving=None)
 
     @property
     def _good(self) -> float:
@@ -98,7 +101,7 @@ class Arriving:
     def _off(self) -> float:
         """How far pan and tilt are from where they should be, degrees."""
         pose = self.helm.limits.pose(self.seen[-1])
-        return max(abs(pose[axis] - self.to[axis]) for axis in (PAN, TILT))
+        return max(abs(pose[axis] - self.to[axis]) for axis in ((PAN,) if self.ended else (PAN, TILT)))
 
     @property
     def _rests(self) -> bool:
@@ -110,7 +113,7 @@ class Arriving:
 
     @property
     def _there(self) -> bool:
-        near = self.certain and self._near and self._zoomed(self.seen[-1])
+        near = self.certain and self.when > self.ended and self._near and self._zoomed(self.seen[-1])
         return near and (self._rests or self._goes_there)
 
     @property
@@ -122,8 +125,10 @@ class Arriving:
     @property
     def _goes_there(self) -> bool:
         """Whether what may still turn surely ends there."""
-        goes_on = self.hops and self.seen[-1].moving is True and not self.helm.skill.always_moving
-        return not self.about and not goes_on and zoom_drive.sure(self.helm.skill, self.zooming, self.now)
+        skill, moving = self.helm.skill, self.seen[-1].moving
+        goes_on = self.hops and moving is True and not skill.always_moving
+        ends = skill.tells_rest(moving) or zoom_drive.sure(skill, self.zooming, self.now)
+        return not self.about and not goes_on and ends
 
     @property
     def _beside(self) -> bool:

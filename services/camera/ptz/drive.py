@@ -17,7 +17,7 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told
-from services.camera.ptz.skill import NEARER_DEG, Skill
+from services.camera.ptz.skill import Skill
 from services.camera.requests import GotoPreset, MoveTo, Reply
 
 ABSOLUTE: tuple[Literal["PositionABS", "moveAbsolutely"], ...] = ("PositionABS", "moveAbsolutely")
@@ -40,11 +40,15 @@ class Drive:
 
 @dataclass(frozen=True)
 class Begun:
-    """One under way: from where, and the answer that it began with."""
+    """One under way: from where, and the answer that it began with.
+
+    `ended`: tilt does not go there, but was ended by it and rests from then on; 0: it does.
+    """
 
     drive: Drive
     here: Pose
     reply: Reply
+    ended: float = 0.0
 
     def zooming(self, skill: Skill) -> Glide:
         """The way of zoom."""
@@ -56,14 +60,7 @@ class Begun:
 
     def nears(self, skill: Skill, left: float) -> float:
         """When no more than so many degrees of pan and tilt should be left, and all of zoom be done."""
-        return self.reply.received + longest(skill, self.here, self.drive.to, left)
-
-    def ends(self, skill: Skill, seen: Pose, when: float, zoom_near: float) -> bool:
-        """Whether a reading shows it on its last bit of way, and tilt, which was ended when it began, at rest."""
-        tilt, to = skill.paces[TILT], self.drive.to
-        rests = self.reply.received + tilt.change(tilt.speeds[-1])
-        there = abs(seen[PAN] - to[PAN]) <= NEARER_DEG and abs(seen[ZOOM] - to[ZOOM]) <= zoom_near
-        return there and when > rests and zoom_drive.sure(skill, self.zooming(skill), when)
+        return max(self.ended, self.reply.received + longest(skill, self.here, self.drive.to, left))
 
     def look(self, skill: Skill, reply: Reply, seen: Pose) -> None:
         """What a look tells of its speed, on the axes that do not slow down yet; `seen`: its reading as a pose."""
@@ -181,6 +178,6 @@ def pan_only(skill: Skill) -> bool:
     return "pan" in skill.honours.values() and "yes" not in skill.honours.values()
 
 
-def to_pan(here: Pose, to: Pose) -> Drive:
+def to_pan(here: Pose, to: Pose) -> MoveTo:
     """To a pan and a zoom, on such firmware."""
-    return Drive(MoveTo(to[PAN] % 360.0, round(here[TILT], 1), to[ZOOM], "PositionABS"), to)
+    return MoveTo(to[PAN] % 360.0, round(here[TILT], 1), to[ZOOM], "PositionABS")

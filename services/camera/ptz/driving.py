@@ -11,7 +11,7 @@ from services.camera.ptz.arriving import Arriving
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import Helm
-from services.camera.requests import Reading, Refused, Reply, Request, Status
+from services.camera.requests import Reading, Refused, Request, Status
 
 MOST_DRIVES = 4  # in one move
 TRY_LEFT = 7  # commands; with fewer nothing new is tried
@@ -30,48 +30,56 @@ class Driving:
 
     def drive(self, reading: Reading, now: float) -> Plan[tuple[Reading, float] | None]:
         """Lets the firmware drive, where it has a way to; None when it has not."""
-        here = self.helm.pose(reading)
+        skill, here = self.helm.skill, self.helm.pose(reading)
         aim = (self.helm.aim[PAN], self.helm.aim[TILT], self.helm.goal.pose[ZOOM])
         while self.helm.zoom_ends is None and self.drives < MOST_DRIVES:
-            way = own.find(here, aim, self.helm.limits, self.helm.skill, self.presets)
+            way = own.find(here, aim, self.helm.limits, skill, self.presets)
             if way is None or way.request in self.tried:
                 break
-            if not own.honoured(self.helm.skill, way) and self._late():
+            if not own.honoured(skill, way) and self._late():
                 break
             self.drives += 1
             self.tried.append(way.request)
             try:
                 begun = yield from self.helm.send(way.request)
             except Refused:
-                own.refuse(self.helm.skill, way)
+                own.refuse(skill, way)
                 continue
-            return (yield from self._arrive(way, here, begun))
+            drive, proven = own.Begun(way, here, begun), own.honoured(skill, way)
+            reading, now, rests = yield from follow(self.helm, drive, certain=own.certain(skill, way), proven=proven)
+            there = self.helm.limits.pose(reading) if rests else way.to  # one on its last bit of way teaches nothing
+            own.judge(skill, here, way, there)
+            return reading, now
         return None
 
     def _late(self) -> bool:
         """Whether there is no time to try something new: one in a move, and while there are commands left."""
         return self.drives > 1 or self.helm.left < TRY_LEFT
 
-    def _arrive(self, way: own.Drive, here: Pose, begun: Reply) -> Plan[tuple[Reading, float]]:
-        """Looks at the firmware's own move until it has ended; once on the way, where its speed is not known well."""
-        now, skill, drive = begun.received, self.helm.skill, own.Begun(way, here, begun)
+
+def follow(helm: Helm, drive: own.Begun, *, certain: bool, proven: bool) -> Plan[tuple[Reading, float, bool]]:
+    """Looks at the firmware's own move until it has ended; once on the way, where its speed is not known well.
+
+    `certain`: it is known where that leads; `proven`: from experience. Returns the reading, when it rests, and whether
+    that surely shows the camera at rest.
+    """
+    now, skill, way = drive.reply.received, helm.skill, drive.drive
+    arrives = drive.arrives(skill)
+    known = all(skill.drive(axis).known(1) for axis in (PAN, TILT))
+    if not drive.ended and arrives - now > (LONG_S if known else 3 * skill.timing.usual):
+        now = yield from wait(now + 0.6 * (arrives - now) - skill.timing.usual)
+        reply = yield from helm.send(Status())
+        now = reply.received
+        drive.look(skill, reply, helm.limits.pose(cast(Reading, reply.result)))
         arrives = drive.arrives(skill)
-        known = all(skill.drive(axis).known(1) for axis in (PAN, TILT))
-        if arrives - now > (LONG_S if known else 3 * skill.timing.usual):
-            now = yield from wait(now + 0.6 * (arrives - now) - skill.timing.usual)
-            reply = yield from self.helm.send(Status())
-            now = reply.received
-            drive.look(skill, reply, self.helm.limits.pose(cast(Reading, reply.result)))
-            arrives = drive.arrives(skill)
-        left = LEFT_DEG if skill.exact >= EXACT and own.honoured(skill, way) else 0.0
-        end = Arriving(self.helm, way.to, drive.zooming(skill), own.certain(skill, way), left=left)
-        reading, now, rests = yield from end.at_rest(arrives, now, drive.nears(skill, left))
-        self.helm.rests = arrives
-        skill.foretold = way.to if reading is not end.seen[-1] else None
-        if end.certain and skill.foretold is None:
-            skill.ended(self.helm.limits.pose(reading), way.to)
-        there = self.helm.limits.pose(reading) if rests else way.to  # one on its last bit of way teaches nothing
-        own.judge(skill, here, way, there)
-        skill.lead_zoom(reading.zoom, way.to[ZOOM])
-        self.helm.stand(reading)
-        return reading, now
+    left = LEFT_DEG if proven and skill.exact >= EXACT else 0.0
+    end = Arriving(helm, way.to, drive.zooming(skill), certain, left=left, ended=drive.ended)
+    reading, now, rests = yield from end.at_rest(arrives, now, drive.nears(skill, left))
+    helm.rests, helm.foretold = arrives, reading is not end.seen[-1]
+    there = helm.limits.pose(reading)
+    skill.foretold = there if helm.foretold else None
+    if certain and not helm.foretold:
+        skill.ended(there, (way.to[PAN], there[TILT] if drive.ended else way.to[TILT], there[ZOOM]))
+    skill.lead_zoom(reading.zoom, way.to[ZOOM])
+    helm.stand(reading)
+    return reading, now, rests

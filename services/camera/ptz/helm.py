@@ -8,9 +8,7 @@ from typing import cast
 
 from services.camera.device import same
 from services.camera.plan import Plan, ask, wait
-from services.camera.ptz import zoom_drive
 from services.camera.ptz.course import FOREVER, PAN, TILT, ZOOM, Course
-from services.camera.ptz.drive import Begun
 from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE, READ_LATE, READ_PART, STOP_LATE
 from services.camera.ptz.skill import LATE_PART, Skill
@@ -47,7 +45,6 @@ class Helm:
         self.commands = self.stuck = 0
         self.turned: set[int] = {PAN, TILT}  # since it was last judged where they rest
         self.zoom_ends: float | None = None
-        self.driven: Begun | None = None  # what the firmware drives by itself
         self.foretold = False  # whether where it stands was
         self.rests = 0.0  # when it came to rest, as is reckoned
         self.course = Course(limits, skill, self.aim)
@@ -61,11 +58,6 @@ class Helm:
     def near(self) -> float:
         """As near as that a reading of pan or tilt has arrived, degrees."""
         return max(self.skill.near, self.goal.near)
-
-    @property
-    def quiet(self) -> float:
-        """Until then the firmware drives by itself; 0: it does not."""
-        return self.driven.arrives(self.skill) if self.driven is not None else 0.0
 
     def pose(self, reading: Reading) -> Pose:
         """A reading as a pose, with what is known better of zoom."""
@@ -115,9 +107,9 @@ class Helm:
         """The reading of pan and tilt at rest, and of zoom when it does not turn."""
         pace = self.skill.paces[PAN]
         now = yield from wait(max(now, self.settled()))
-        self.rests = self._rests()
+        self.rests = self.course.rests_at()
         reply, seen, reading = yield from self._look()
-        since, at_once = reply.sent, reading is not None
+        since = reply.sent
         while reading is None or (
             self.zoom_ends is None and (pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading))
         ):
@@ -125,33 +117,17 @@ class Helm:
             before = seen
             reply, seen, reading = yield from self._look()
             since = since if same(before, seen) else reply.sent
-            if self._still(reply.sent, since) and self.zoom_ends is None:
+            if reply.sent >= since + PAIR_S and self.zoom_ends is None:
                 self.skill.always_moving = seen.moving is True
                 reading = seen
                 break
         self.foretold = reading is not seen
-        rests = 0.0 if self.skill.tells_rest(seen.moving) else self._rests() + self._longer() + RESTS_S
-        if rests and self.driven is not None:
-            rests = max(rests, zoom_drive.rests(self.skill, self.driven.zooming(self.skill)))
+        rests = 0.0 if self.skill.tells_rest(seen.moving) else self.course.rests_at() + self._longer() + RESTS_S
         if self.zoom_ends is not None:
             self.time_zoom(reply.received)
-        if self.driven is None:
-            self._place_zoom(reading)
-        else:
-            self.skill.lead_zoom(reading.zoom, self.driven.drive.to[ZOOM])
-            self.skill.expect_arrival(there=at_once)
-        self.driven = None
+        self._place_zoom(reading)
         self.stand(reading)
         return reading, (yield from wait(max(reply.received, rests)))
-
-    def _rests(self) -> float:
-        """When it comes to rest, as far as is known by now."""
-        return max(self.quiet, self.course.rests_at())
-
-    def _still(self, sent: float, since: float) -> bool:
-        """Whether readings that are the same since some time show a camera at rest, its zoom included."""
-        zoom = self.driven.zooming(self.skill) if self.driven is not None else None
-        return sent >= since + PAIR_S and (zoom is None or zoom_drive.shown(self.skill, zoom, sent, since))
 
     def _look(self) -> Plan[tuple[Reply, Reading, Reading | None]]:
         """A look where it should rest: the answer, its reading, and that of the rest; None: not known by this one."""
@@ -160,8 +136,6 @@ class Helm:
         rest = self._resting(reply, seen)
         self._weigh(rest or seen)
         self._see_still(rest or seen)
-        if self.driven is not None:
-            self.driven.look(self.skill, reply, self.limits.pose(seen))
         self.course.read(reply, seen)
         return reply, seen, rest
 
@@ -170,9 +144,7 @@ class Helm:
         pace, late = self.skill.paces[PAN], self.skill.timing.late(reply)
         when, moves = pace.seen_at(reply.sent, late), self._moves(seen) and self.zoom_ends is None
         slack = self._unsure(late)
-        if moves and self.driven is not None and self.driven.ends(self.skill, self.pose(seen), when, self.zoom_near):
-            return replace(seen, moving=None)
-        if seen.moving is False or self.quiet or any(self.course.levels[:2]) or when > self.course.rests_at() + slack:
+        if seen.moving is False or any(self.course.levels[:2]) or when > self.course.rests_at() + slack:
             return None if moves else seen
         pose, left = self.limits.pose(seen), [0.0, 0.0]
         for axis in (PAN, TILT):
@@ -199,7 +171,7 @@ class Helm:
         """An axis that was not turned shows how well readings repeat."""
         pose = self.limits.pose(reading)
         for axis in (PAN, TILT):
-            if not self.course.told[axis] and not self.quiet and not self.foretold:
+            if not self.course.told[axis] and not self.foretold:
                 self.skill.see_still(pose[axis] - self.course.origin[axis])
 
     def reckoned(self, axis: int) -> float:
@@ -259,10 +231,8 @@ class Helm:
 
     def settled(self) -> float:
         """When a reading has to be asked for that shows everything at rest."""
-        if self.quiet:
-            return self._rests() - self.skill.read_late + self.skill.arrives_late
         doubt = self.skill.paces[PAN].other_doubt(READ_LATE) + self._slows()
-        return self._rests() - self.skill.read_late + min(LONGEST_DOUBT_S, doubt)
+        return self.course.rests_at() - self.skill.read_late + min(LONGEST_DOUBT_S, doubt)
 
     def _place_zoom(self, reading: Reading) -> None:
         """Where zoom truly stands: what was reckoned, as far as its reading and its range allow; as before, at rest."""

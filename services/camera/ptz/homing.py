@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from services.camera.plan import Plan
+from services.camera.plan import Plan, wait
 from services.camera.ptz import drive as own
 from services.camera.ptz.course import PAN, TILT, ZOOM
+from services.camera.ptz.driving import follow
 from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.ladder import Ladder
 from services.camera.ptz.leg import Leg, Part
 from services.camera.ptz.outlook import Way
+from services.camera.requests import Reading, Refused
 
 ALONG = 1.0
 BACK_DEG = 10.0  # it goes no farther behind its goal
@@ -31,8 +33,23 @@ class Homing:
     def __init__(self, helm: Helm, watch: Watch) -> None:
         self.helm, self.watch = helm, watch
 
-    def tilt(self, now: float) -> Plan[float]:
-        """Leads tilt to its goal, and pan along; returns when the position was answered that ends both."""
+    def home(self, axes: list[int], now: float) -> Plan[tuple[Reading, float] | None]:
+        """Leads all to their goals, and looks until they rest; None where the firmware is another, or is not needed."""
+        helm, sure = self.helm, all(self.helm.skill.senses[axis].sure for axis in axes)
+        if not (own.pan_only(helm.skill) and sure and {PAN, ZOOM} & set(axes)):
+            return None
+        if helm.zoom_ends is not None:
+            now = yield from wait(helm.zoom_ends)
+        try:
+            return (yield from self._end((yield from self._tilt(now)) if TILT in axes else now))
+        except Refused:
+            if not helm.skill.diagonals or TILT not in axes:
+                raise
+            helm.skill.diagonals = False
+            return (yield from self.home(axes, now))
+
+    def _tilt(self, now: float) -> Plan[float]:
+        """Leads tilt to its goal, and pan along; returns when it has to be ended."""
         helm, speed = self.helm, 0
         if abs(self._way(TILT, now).distance) > helm.near or not helm.course.told[TILT]:
             ladder, side, speed = self._set_out(now)
@@ -52,7 +69,7 @@ class Homing:
             speed = ladder.next(self._left(side, now), speed, helm.left - LOOK)
             if speed < 0:
                 ladder, side, speed = ladder.back, -side, -speed
-        return (yield from self.home(now))
+        return now
 
     def _set_out(self, now: float) -> tuple[Ladder, int, int]:
         """From rest, or from where nothing is reckoned for: the way to the goal, its side, and the first speed."""
@@ -62,17 +79,20 @@ class Homing:
         ladder = Ladder(way, self.helm.skill, Ladder(back, self.helm.skill))
         return ladder, side, ladder.begins(abs(way.distance), self.helm.left - LOOK)
 
-    def home(self, now: float) -> Plan[float]:
+    def _end(self, now: float) -> Plan[tuple[Reading, float]]:
         """Pan and zoom are driven to their goal; tilt ends."""
         helm = self.helm
         pan, tilt, zoom = (helm.course.stopped(axis, now) for axis in range(3))
-        here = (pan, tilt, zoom)
-        way = own.to_pan(here, (helm.aim[PAN], here[TILT], helm.goal.pose[ZOOM]))
-        begun = yield from helm.send(way.request)
-        here = (pan, helm.course.stopped(TILT, begun.received), zoom)
-        helm.course.leave(here)
-        helm.driven = own.Begun(way, here, begun)
-        return begun.received
+        request = own.to_pan((pan, tilt, zoom), helm.aim)
+        begun, pace, level = (yield from helm.send(request)), helm.skill.paces[TILT], abs(helm.course.levels[TILT])
+        tilt = helm.course.stopped(TILT, begun.received)
+        ended = begun.received + pace.change(level)
+        helm.course.leave((pan, tilt, zoom))
+        helm.zoom_ends = None
+        to = (helm.aim[PAN], tilt, helm.goal.pose[ZOOM])
+        drive = own.Begun(own.Drive(request, to), (pan, tilt, zoom), begun, ended)
+        reading, now, _ = yield from follow(helm, drive, certain=True, proven=True)
+        return reading, now
 
     def _way(self, axis: int, now: float) -> Way:
         helm = self.helm

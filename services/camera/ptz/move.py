@@ -18,6 +18,7 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.driving import Driving
 from services.camera.ptz.goal import Goal, Limits, Pose
 from services.camera.ptz.helm import PROMISED, Helm
+from services.camera.ptz.homing import Homing
 from services.camera.ptz.hopping import Hopping
 from services.camera.ptz.outlook import LEG
 from services.camera.ptz.skill import DITHER_DEG, Skill
@@ -71,6 +72,7 @@ class Move:
         self.helm = Helm(goal, limits, skill)
         self.zooming = Zooming(self.helm)
         self.turning = Turning(self.helm, self.zooming)
+        self.homing = Homing(self.helm, self.turning.watch)
         self.driving = Driving(self.helm, presets)
         self.hopping = Hopping(self.helm)
 
@@ -88,9 +90,7 @@ class Move:
             if now > self.until or self.helm.stuck >= STUCK:
                 raise DeviceError(self._failed(reading, "in time" if now > self.until else "the camera does not turn"))
             before = self.helm.limits.pose(reading)
-            driven = yield from self.driving.drive(reading, now)
-            if driven is None and self.helm.zoom_ends is None:
-                driven = yield from self.hopping.hop(now)
+            driven = yield from self._driven(reading, out, now)
             if driven is not None:
                 reading, now = driven
                 self.helm.turned = {PAN, TILT}
@@ -105,6 +105,13 @@ class Move:
             reading, now = yield from self.helm.rest((yield from self.zooming.settle(now)))
             self._notice(before, self.helm.limits.pose(reading), out)
         raise DeviceError(self._failed(reading, f"with {MOST_LEGS} motions"))
+
+    def _driven(self, reading: Reading, out: list[int], now: float) -> Plan[tuple[Reading, float] | None]:
+        """What the firmware does by itself, all or the end of it; None: nothing that is known of."""
+        driven = yield from self.driving.drive(reading, now)
+        if driven is None and self.helm.zoom_ends is None:
+            driven = yield from self.hopping.hop(now)
+        return driven or (yield from self.homing.home(out, now))
 
     def _begin(self, near: Reading | None) -> Plan[tuple[Reading, float]]:
         """Where it stands to begin with; a reading of a moment ago is as good as one now."""

@@ -10,10 +10,8 @@ from math import inf
 from typing import cast
 
 from services.camera.plan import Plan, wait
-from services.camera.ptz import drive as own
 from services.camera.ptz.course import PAN, TILT
 from services.camera.ptz.helm import Helm, levels_of, sign
-from services.camera.ptz.homing import Homing
 from services.camera.ptz.leg import DANGER, Leg, choose
 from services.camera.ptz.outlook import BLIND_S, Way
 from services.camera.ptz.zooming import Zooming
@@ -45,7 +43,6 @@ class Turning:
 
     def __init__(self, helm: Helm, zooming: Zooming) -> None:
         self.helm, self.zooming = helm, zooming
-        self.homing = Homing(helm, self._watch)
 
     def turn(self, axes: list[int], now: float, *, zoom: bool) -> Plan[float]:
         """One leg of pan and tilt; it ends with a stop, or with zoom in its place. Returns when that was answered."""
@@ -56,8 +53,6 @@ class Turning:
             if unsure:
                 now = yield from self._probe(unsure)
                 axes = [axis for axis in axes if self.helm.skill.senses[axis].sure] or axes
-            elif own.pan_only(self.helm.skill) and (zoom or PAN in axes):
-                return (yield from (self.homing.tilt(now) if TILT in axes else self.homing.home(now)))
             return (yield from self._legs(axes, now, zoom=zoom))
         except Refused:
             if not self.helm.skill.diagonals or len(axes) < 2:
@@ -116,13 +111,13 @@ class Turning:
     def _see_through(self, leg: Leg, turning: dict[int, int], now: float) -> Plan[float]:
         """From the start of a leg to the time for its end; an axis that ends before the other is ended."""
         while not leg.joint and len(turning) > 1:
-            now = yield from self._watch(leg, turning, now)
+            now = yield from self.watch(leg, turning, now)
             ends = {axis: self._end(leg, axis, now) for axis in turning}
             if max(ends.values()) <= now + self.helm.skill.timing.usual:
                 return now  # so late that both are to end
             del turning[min(ends, key=lambda axis: ends[axis])]
             now = (yield from self.helm.start(levels_of(turning))).received
-        return (yield from self._watch(leg, turning, now))
+        return (yield from self.watch(leg, turning, now))
 
     def _goes_on(self, leg: Leg, now: float) -> list[int]:
         """The axes that need another leg at once: it ended early for fear of a stop, and is known well enough."""
@@ -228,7 +223,7 @@ class Turning:
                 return True
         return False
 
-    def _watch(self, leg: Leg, left: dict[int, int], now: float) -> Plan[float]:
+    def watch(self, leg: Leg, left: dict[int, int], now: float) -> Plan[float]:
         """Waits until the next end has to be sent; reads on the way where that makes the end more certain."""
         usual, spread = self.helm.skill.timing.usual, self.helm.skill.timing.spread
         for look in range(MOST_LOOKS):
