@@ -81,19 +81,24 @@ class Outcome:
 
 @dataclass
 class Rig:
-    """One simulated camera, the brand's client, and what the regulator has learnt so far."""
+    """One simulated camera, the brand's client, and what the regulator has learnt so far.
+
+    `network_s`: an answer comes so much after it left the camera, on average (exponentially distributed).
+    """
 
     profile: Profile
     seed: int = 1
     skill: Skill = field(default_factory=Skill)
     now: float = START
     near: Reading | None = None
+    network_s: float = 0.0
     log: Callable[[Reply], None] = lambda reply: None
 
     def __post_init__(self) -> None:
         world = load(WORLD)
         self.camera = world.cameras["ip1"]
         rng = random.Random(self.seed)
+        self.network = random.Random(self.seed)
         self.device = Device(self.camera, self.profile, self.now, Latency(self.profile, None, rng))
         door = Door(realm(self.profile, self.camera.serial), "ros", "secret123", self.profile, rng)
         self.wire = Counted(Inside(self.device, door, cast(Any, None)))
@@ -173,7 +178,7 @@ class Rig:
             result = self.client.send(request)
         except DeviceError as error:
             fault = error
-        self.now = self.wire.now
+        self.now = self.wire.now + (self.network.expovariate(1 / self.network_s) if self.network_s else 0.0)
         return Reply(request, ticket, result, fault, sent, self.now)
 
 
@@ -214,9 +219,11 @@ def with_other_motors(profile: Profile, seed: int) -> Profile:
     )
 
 
-def outcomes(profile: Profile, goals: Iterable[Goal], seed: int = 1, *, calibrated: bool = False) -> list[Outcome]:
+def outcomes(
+    profile: Profile, goals: Iterable[Goal], seed: int = 1, *, calibrated: bool = False, network_s: float = 0.0
+) -> list[Outcome]:
     """All goals one after the other, some time between two: from a cold start, or after `apartment calibrate ptz`."""
-    rig, found = Rig(profile, seed), []
+    rig, found = Rig(profile, seed, network_s=network_s), []
     if calibrated:
         rig.calibrate()
     for goal in goals:
