@@ -14,7 +14,7 @@ from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import PAIR_S, Helm
 from services.camera.ptz.pace import HALF_CHANGE, READ_LATE
-from services.camera.ptz.skill import NEARER_DEG, THERE_DEG, Skill
+from services.camera.ptz.skill import NEARER_DEG, THERE_DEG
 from services.camera.requests import Reading, Reply, Status
 
 FEW = 3  # commands left
@@ -49,25 +49,25 @@ class Arriving:
     when: float = field(default=0.0, init=False)  # what that tells of
     since: float = field(default=FOREVER, init=False)  # the latest reading is the same since then
 
-    def at_rest(self, arrives: float, now: float, nears: float | None = None) -> Plan[tuple[Reading, float, bool]]:
-        """Looks from about then on; `nears`: when no more than `left` of the way should be left.
+    def at_rest(self, nears: float, arrives: float, now: float) -> Plan[tuple[Reading, float, bool]]:
+        """Looks from about the moment on when no more than `left` of the way should be left.
 
         Returns the reading, when it rests, and whether that surely shows the camera at rest.
         """
         skill, self.arrives = self.helm.skill, arrives
         late = max(skill.arrives_late, skill.timing.spread if self.helm.left <= FEW else 0.0)  # none of those too soon
-        yield from wait(max(now, (arrives if nears is None else nears) - skill.read_late + late))
+        yield from wait(max(now, nears - skill.read_late + late))
         for _ in range(LOOKS):
             reply = yield from self._look()
             if self._there or self._beside or self._still(reply.sent):
                 break
             yield from wait(reply.sent + min(LONG_S, PAIR_S * (len(self.seen) - 1)))
         if self.certain and (self._there or not same(self.seen[0], self.seen[-1])):
-            skill.expect_arrival(there=len(self.seen) == 1 and self._off <= self._good)
+            skill.expect_arrival(there=len(self.seen) == 1 and self.off <= self._good)
         still = self._still(reply.sent)
         if still or skill.tells_rest(self.seen[-1].moving):
             return self.seen[-1], reply.received, self._rests or still
-        return self._last, (yield from wait(max(reply.received, self._rested(reply)))), self._rests
+        return self._last, (yield from wait(max(reply.received, self._rested))), self._rests
 
     def _look(self) -> Plan[Reply]:
         reply = yield from self.helm.send(Status())
@@ -87,7 +87,7 @@ class Arriving:
         Whether it moves there nobody has told.
         """
         seen = self.seen[-1]
-        if self.when >= self.arrives or self._rests or not self._there or self._off <= THERE_DEG:
+        if self.when >= self.arrives or self._rests or not self._there or self.off <= THERE_DEG:
             return seen
         tilt = seen.tilt if self.ended else round(self.to[TILT], 2)
         return replace(seen, pan=round(self.to[PAN] % 360.0, 2), tilt=tilt, moving=None)
@@ -98,7 +98,7 @@ class Arriving:
         return max(THERE_DEG, self.about, GOOD * self.left)
 
     @property
-    def _off(self) -> float:
+    def off(self) -> float:
         """How far pan and tilt are from where they should be, degrees."""
         pose = self.helm.limits.pose(self.seen[-1])
         return max(abs(pose[axis] - self.to[axis]) for axis in ((PAN,) if self.ended else (PAN, TILT)))
@@ -120,7 +120,7 @@ class Arriving:
     def _near(self) -> bool:
         """Whether pan and tilt are where they should be, or on a last bit of way that leads there."""
         turns = self.when < self.arrives and not self.helm.skill.tells_rest(self.seen[-1].moving)
-        return self._off <= NEARER_DEG or (turns and self._off <= MOST * self.left)
+        return self.off <= NEARER_DEG or (turns and self.off <= MOST * self.left)
 
     @property
     def _goes_there(self) -> bool:
@@ -134,7 +134,7 @@ class Arriving:
     def _beside(self) -> bool:
         """Whether it rests where it should, and the goal is elsewhere."""
         beside = self.helm.beside(self.helm.limits.pose(self.seen[-1]))
-        return beside and self._off <= self.about and self._rests
+        return beside and self.off <= self.about and self._rests
 
     def _still(self, sent: float) -> bool:
         """Whether readings that are the same show that it rests, with its zoom."""
@@ -142,16 +142,11 @@ class Arriving:
         tells = skill.tells_rest(self.seen[-1].moving)
         return sent >= self.since + PAIR_S and (tells or zoom_drive.shown(skill, self.zooming, sent, self.since))
 
-    def _rested(self, reply: Reply) -> float:
-        """When all rests, at the latest, that was seen on its last bit of way."""
+    @property
+    def _rested(self) -> float:
+        """When all rests, at the latest, that was seen slowing down on its last bit of way."""
         skill = self.helm.skill
-        return max(zoom_drive.rests(skill, self.zooming), rests_by(skill, self._off, reply))
-
-
-def rests_by(skill: Skill, off: float, reply: Reply) -> float:
-    """When pan and tilt rest that were seen slowing down so many degrees before their goals; at the latest."""
-    reads = skill.paces[PAN]
-    newer = min(NEWEST_S, NEWER * reads.other_doubt(READ_LATE))
-    seen = reads.seen_at(reply.sent, skill.timing.late(reply)) + newer
-    half = max(pace.other(HALF_CHANGE) for axis in (PAN, TILT) for pace in (skill.drive(axis), skill.paces[axis]))
-    return min(seen, reply.received) + LONGER * sqrt(4 * half * (READ_DEG + off))
+        newer = min(NEWEST_S, NEWER * skill.paces[PAN].other_doubt(READ_LATE))
+        half = max(pace.other(HALF_CHANGE) for axis in (PAN, TILT) for pace in (skill.drive(axis), skill.paces[axis]))
+        turns = min(self.when + newer, self.now) + LONGER * sqrt(4 * half * (READ_DEG + self.off))
+        return max(zoom_drive.rests(skill, self.zooming), turns)

@@ -74,12 +74,11 @@ def follow(helm: Helm, drive: own.Begun, *, certain: bool, proven: bool) -> Plan
         arrives = drive.arrives(skill)
     left = LEFT_DEG if proven and skill.exact >= EXACT else 0.0
     end = Arriving(helm, way.to, drive.zooming(skill), certain, left=left, ended=drive.ended)
-    reading, now, rests = yield from end.at_rest(arrives, now, drive.nears(skill, left))
+    reading, now, rests = yield from end.at_rest(drive.nears(skill, left), arrives, now)
     helm.rests, helm.foretold = arrives, reading is not end.seen[-1]
-    there = helm.limits.pose(reading)
-    skill.foretold = there if helm.foretold else None
+    skill.foretold = helm.limits.pose(reading) if helm.foretold else None
     if certain and not helm.foretold:
-        skill.ended(there, (way.to[PAN], there[TILT] if drive.ended else way.to[TILT], there[ZOOM]))
+        skill.ended(end.off)
     skill.lead_zoom(reading.zoom, way.to[ZOOM])
     helm.stand(reading)
     return reading, now, rests

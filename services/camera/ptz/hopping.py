@@ -97,7 +97,7 @@ class Hopping:
         self.helm.rests = arrives
         about = 0.0 if self._exact(to) else ABOUT_DEG
         end = Arriving(self.helm, to, self.zooming, certain, about, hops=True)
-        reading, now, _ = yield from end.at_rest(arrives, now)
+        reading, now, _ = yield from end.at_rest(arrives, arrives, now)
         if reading is end.seen[-1]:
             self._learn(reading, to, certain=certain)
         else:  # one on its last bit of way teaches nothing

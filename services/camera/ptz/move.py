@@ -120,8 +120,9 @@ class Move:
             self.helm.commands += 2
         else:
             reading, now = near, (yield from wait(0.0))
-            if self.helm.skill.foretold is not None and near.moving is not None:
-                self.helm.skill.ended(self.helm.limits.pose(near), self.helm.skill.foretold)
+            here, foretold = self.helm.limits.pose(near), self.helm.skill.foretold
+            if foretold is not None and near.moving is not None:
+                self.helm.skill.ended(max(abs(here[axis] - foretold[axis]) for axis in (PAN, TILT)))
             self.helm.foretold = near.moving is None
         self.helm.stand(reading)
         return reading, now

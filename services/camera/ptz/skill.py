@@ -214,10 +214,9 @@ class Skill:
         if reading not in ends and reading not in self.zoom_steps:
             self.zoom_steps = [*self.zoom_steps[-7:], reading]
 
-    def ended(self, there: tuple[float, float, float], to: tuple[float, float, float]) -> None:
-        """A move by the firmware was read at its end: whether that is where it should be."""
-        exact = max(abs(there[axis] - to[axis]) for axis in (0, 1)) <= THERE_DEG
-        self.exact, self.foretold = self.exact + 1 if exact else 0, None
+    def ended(self, off: float) -> None:
+        """A move by the firmware was read at its end, so many degrees from where that should be."""
+        self.exact, self.foretold = self.exact + 1 if off <= THERE_DEG else 0, None
 
     def lead_zoom(self, reading: float, to: float) -> None:
         """The firmware drove zoom there by itself: so it stands there, unless its reading is of another step."""

@@ -36,7 +36,6 @@ class Endless:
 
     def __init__(self, address: Address, gate: Gate, silence_s: float) -> None:
         self._login = Login(address.user, address.password, gate)
-        self._silence_s = silence_s
         self._http = httpx.Client(
             base_url=address.url,
             auth=self._login,
@@ -49,18 +48,18 @@ class Endless:
     @contextmanager
     def open(self, target: str, patience_s: float | None = None) -> Iterator[tuple[httpx.Response, Iterator[bytes]]]:
         """The answer's head and its bytes; Away when there is none or it breaks, Silent when nothing more comes."""
-        begun, silence_s = False, patience_s or self._silence_s
+        begun, silence_s = False, self._http.timeout.read
         try:
             with self._http.stream("GET", target) as response:
                 self._socket = _socket_of(response)
                 begun = True
-                response.request.extensions["timeout"]["read"] = silence_s  # of what is read from now on
                 if response.status_code != 200 or response.headers.get("content-type", "").startswith("text/"):
                     response.read()  # a refusal
+                silence_s = response.request.extensions["timeout"]["read"] = patience_s or silence_s  # from now on
                 yield response, response.iter_raw()
         except httpx.ReadTimeout as error:
             kind = Silent if begun else Away
-            raise kind(f"nothing came for {silence_s if begun else self._silence_s:g} s") from error
+            raise kind(f"nothing came for {silence_s:g} s") from error
         except httpx.HTTPError as error:
             raise Away(f"the connection broke: {type(error).__name__} {error}".strip()) from error
         finally:
