@@ -94,10 +94,10 @@ class RosNode:
     def close(self) -> None:
         """See `Node`."""
         self._stopping.set()
+        self._registrar.join(LEAVE_S)  # rospy does not take it well to be shut down while it starts
         leaving = threading.Thread(target=self._rospy.signal_shutdown, args=("the bridge ends",), daemon=True)
         leaving.start()
         leaving.join(LEAVE_S)
-        self._registrar.join(LEAVE_S)
 
     def _register(self) -> None:
         """The registrar's thread."""

@@ -17,6 +17,7 @@ from services.errors import Unavailable
 
 TIMEOUT_S = 2.0  # loopback answers within a millisecond; a hanging master must not hold the registrar for long
 GOOD = 1  # the code of a call that was done (ROS Master API)
+FAULTS = (OSError, http.client.HTTPException, xmlrpc.client.Error, ExpatError, ValueError, TypeError)
 
 
 class _Transport(xmlrpc.client.Transport):
@@ -93,7 +94,7 @@ def _call(uri: str, method: str, *arguments: Any) -> Any:
     try:
         with xmlrpc.client.ServerProxy(uri, transport=_Transport()) as proxy:
             code, text, value = getattr(proxy, method)(*arguments)
-    except (OSError, http.client.HTTPException, xmlrpc.client.Error, ExpatError, ValueError, TypeError) as error:
+    except FAULTS as error:
         raise Unavailable(f"{uri} {method}: {error or type(error).__name__}") from error
     if code != GOOD:
         raise Unavailable(f"{uri} {method}: {text}")

@@ -91,8 +91,10 @@ class Nodes:
     def _registered(self, master: ros_master.Master, known: int | None) -> int | None:
         try:
             pid = master.pid()
-            if self._server is None:
+            if not self._publishers:
                 self._open()
+            if self._server is None:
+                self._server = self._serve()
             if pid != known:
                 ros_master.register(master, ros_node.registrations({}))
         except Unavailable as error:
@@ -102,8 +104,9 @@ class Nodes:
         return pid
 
     def _open(self) -> None:
+        """Makes the node and its topics; rospy waits there for a master that goes meanwhile."""
         ros_node.begin(NODE)
-        rospy, actionlib = ros_node.rospy(), importlib.import_module("actionlib")
+        rospy = ros_node.rospy()
         for topic, kind, latch in (
             ("/tf", "tf2_msgs/TFMessage", False),
             ("/tf_static", "tf2_msgs/TFMessage", True),
@@ -114,15 +117,21 @@ class Nodes:
         ):
             self._publishers[topic] = rospy.Publisher(topic, _kind(kind), queue_size=5, latch=latch)
         rospy.Service(HINDER, importlib.import_module("std_srvs.srv").Trigger, self._hindered)
-        move_base = importlib.import_module("move_base_msgs.msg")
-        self._feedback = move_base.MoveBaseFeedback
-        server = actionlib.SimpleActionServer("/move_base", move_base.MoveBaseAction, self._go, auto_start=False)
-        server.start()
-        self._server = server
+        self._feedback = importlib.import_module("move_base_msgs.msg").MoveBaseFeedback
         self._say_fixed()
         camera = threading.Thread(target=self._film, name="camera", daemon=True)
         self._threads.append(camera)
         camera.start()
+
+    def _serve(self) -> Any:
+        """Starts move_base's server; Unavailable when the master goes meanwhile: actionlib asks it for parameters."""
+        action = importlib.import_module("move_base_msgs.msg").MoveBaseAction
+        server = importlib.import_module("actionlib").SimpleActionServer("/move_base", action, self._go, False)
+        try:
+            server.start()
+        except ros_master.FAULTS as error:  # one that has not started takes no goals; the next one will
+            raise Unavailable(f"actionlib: {error or type(error).__name__}") from error
+        return server
 
     def _move(self, seconds: float) -> None:
         with self.lock:
