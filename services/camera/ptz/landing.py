@@ -2,8 +2,9 @@
 
 A look tells of the moment when it was asked for and is answered a while later: asked for at rest it costs that time,
 asked for while the camera brakes the camera rests when the answer comes. Where it will rest is then reckoned, from how
-far off its course the look shows it: on its last degree little else is possible. Not here: the looks and hops
-themselves (`hopping.py`), how far off the end of a chain of hops may be (`scale.py`).
+far off its course the look shows it: its last hop began beside where it should, or goes farther than it should (two
+unknowns, one measurement: a Kalman filter's update). Not here: the looks and hops themselves (`hopping.py`), how far
+off the end of a chain of hops may be (`scale.py`).
 """
 
 from __future__ import annotations
@@ -27,26 +28,23 @@ from services.camera.requests import Reading, Reply
 LEFT_DEG = (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, the most that tells enough
 LEFT_LEVELS = 0.6  # of zoom's way, at most, where it is told in coarse steps
 EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
-EXPECTED_NOISE_DEG, EXPECTED_EXACT_DEG = 0.4, 0.18  # and whose own noise is no more; where hops are not familiar yet
-LATER, LATER_YET = 0.1, 0.4  # of the spread of answers: so much later, since a quick one is before its time; there
+EXPECTED_NOISE_DEG = 0.3  # and whose own noise is no more
+LATER = 0.1  # of the spread of answers: so much later, since a quick one is before its time
 
 # What is known without a look, and how exact one is; standard deviations.
 LEAST_DEG = 0.05  # of where hops lead
+FARTHER, FARTHEST_DEG = 0.1, 0.5  # of its way: a hop may go so much farther than by all that is learnt; at most
+BEFORE = 2.0  # of the doubt of where it began, not shown before it brakes: the hop before may not have ended
 ENDED = 2.0  # deviations: when the hop ended whose place another one took
 FAR = 2.0  # such deviations of the time: what rests by now need not have rested a moment before
 READ_DEG = 0.06  # of a reading
 LEAST_S = 0.004  # of the moment that a look tells of
 STEP_DEG = 0.05  # of the goal: what it would change of a look
-LEAST_SHOWN = 0.1  # of a change of the goal; before it brakes a look shows none
-UNSEEN = 0.1  # of the doubt of the goal is noise of a look that shows nothing of the goal
-BENT = 0.15  # of how far off it ends: the reckoning of that may be wrong by so much
+BENT = 0.05  # of how far off it is seen: the reckoning of its end may be wrong by so much
 
 # What follows from it.
 SURE = 1.75  # standard deviations that it may end farther off than is likeliest, to have arrived
 MISSED = 1.25  # and nearer, for a hop to go on from there: one too many does little harm
-FAMILIAR = 0.3  # of all doubt: where experience leaves more, a look by itself has to show it at its goal, exactly
-NOISE_DEG = 0.4  # which it does not with more noise,
-KNOWN_DEG = 0.18  # unless no more was in doubt before it
 OUTLIER = 2.0  # of them; a look farther off its course than that is of something else
 ARRIVES_DEG = 0.45  # it ends at its goal if it ends so near at the worst: 0.5 is promised
 RESTED_S = 0.02  # after it is reckoned to rest: what still moves then does not go as was reckoned
@@ -60,7 +58,7 @@ Verdict = Literal["there", "beside", "unsure"]
 class Doubts:
     """What is not known of an axis on its way, standard deviations.
 
-    `goal`: how far it was to go, degrees; `place`: where that began, degrees, and then all of its way is beside;
+    `goal`: how far its last hop goes, degrees; `place`: where that began, degrees, and then all of its way is beside;
     `read`: a reading, degrees; `time`: the moment that it tells of, seconds; `change`: its acceleration, a share;
     `start`: seconds that a hop in flight was sooner or later on its way. `share`: what experience left of all that.
     """
@@ -78,11 +76,6 @@ class Doubts:
         """Where it will rest, degrees."""
         return hypot(self.goal, self.place)
 
-    @property
-    def familiar(self) -> bool:
-        """Whether experience leaves little doubt of such motions."""
-        return self.share <= FAMILIAR
-
 
 @dataclass(frozen=True)
 class End:
@@ -99,7 +92,6 @@ class End:
     seen: float
     noise: float
     odd: bool = False
-    familiar: bool = False
 
 
 def doubts(skill: Skill, form: RelativeForm, hops: Sequence[Hop], place: float) -> tuple[Doubts, Doubts]:
@@ -108,11 +100,12 @@ def doubts(skill: Skill, form: RelativeForm, hops: Sequence[Hop], place: float) 
     time = _time(skill, skill.timing.spread / 2, share)
 
     def of(axis: int) -> Doubts:
-        goal, before = scale.doubts(skill.scales[form], hops, axis)
+        goes, begins = scale.doubts(skill.scales[form], hops, axis)
         change = skill.paces[axis].other_doubt(HALF_CHANGE) / skill.paces[axis].other(HALF_CHANGE)
-        began = hypot(share * before, place)
+        goal = share * hypot(goes, _farther(hops[-1].ways[axis]))
         start = _start(skill, hops, axis, share * change)
-        return Doubts(hypot(share * goal, LEAST_DEG), began, READ_DEG, time, share * change, start, share)
+        began = hypot(share * begins, place)
+        return Doubts(hypot(goal, LEAST_DEG), began, READ_DEG, time, share * change, start, share)
 
     return of(PAN), of(TILT)
 
@@ -124,7 +117,7 @@ def _start(skill: Skill, hops: Sequence[Hop], axis: int, change: float) -> float
     acceleration, a share.
     """
     before = ENDED * max(0.0, _lasts(skill, hops[-2], axis, change) - hops[-1].rested) if len(hops) > 1 else 0.0
-    return hypot(before, _lasts(skill, hops[-1], axis, change)) if hops else 0.0
+    return hypot(before, _lasts(skill, hops[-1], axis, change))
 
 
 def _lasts(skill: Skill, hop: Hop, axis: int, change: float) -> float:
@@ -150,34 +143,41 @@ def _time(skill: Skill, late: float, share: float) -> float:
 
 def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> float | None:
     """When to ask for a look that tells where pan and tilt will rest, the earliest; None: no look would."""
-    turning, familiar = glides[:ZOOM], all(one.familiar for one in known)
-    noise, later = (EXPECTED_NOISE_DEG, LATER) if familiar else (EXPECTED_EXACT_DEG, LATER_YET)
+    turning = glides[:ZOOM]
     zoomed = glides[ZOOM].nears(LEFT_LEVELS if skill.zoom_grid else 0.0)
     for left in LEFT_DEG:
         when = max(zoomed, *(glide.within(left) for glide in turning))
         told = [foretell(glide, when, glide.at(when)[0], known[axis]) for axis, glide in enumerate(turning)]
-        if all(end.doubt <= EXPECTED_DOUBT_DEG and end.noise <= noise for end in told):
-            return when - skill.read_late + later * skill.timing.spread
+        if all(end.doubt <= EXPECTED_DOUBT_DEG and end.noise <= EXPECTED_NOISE_DEG for end in told):
+            return when - skill.read_late + LATER * skill.timing.spread
     return None
 
 
 def foretell(glide: Glide, seen: float, place: float, known: Doubts) -> End:
-    """The end of a glide that was seen at a place, at a time: the likeliest, of two things that may have been off."""
-    reckoned, _ = glide.at(seen)
-    other, _ = replace(glide, goal=glide.goal + (STEP_DEG if glide.goal >= reckoned else -STEP_DEG)).at(seen)
-    shown = abs(other - reckoned) / STEP_DEG
+    """The end of a glide that was seen at a place, at a time: the likeliest, by where it began and how far it goes."""
+    reckoned, shown = glide.at(seen)[0], _shown(glide, seen)
     moved = glide.at(seen - FAR * hypot(known.time, known.start))[0] - reckoned
-    noise = hypot(known.read, moved / FAR, known.change * (glide.goal - reckoned))
-    wrong, bends = place - reckoned, 1.0 / max(LEAST_SHOWN, shown) - 1.0
-    before = known.end
-    odd = wrong**2 > OUTLIER**2 * (before**2 + noise**2)
-    # As a place that was off it ends as far off as it is seen; as a goal that was off, farther: it is halfway between.
-    off = wrong * (1 + bends / 2)
-    noise = hypot(noise * (1 + bends / 2), wrong * bends / 2, UNSEEN * bends * known.goal)
-    spread = hypot(before, noise)
-    at = glide.goal + (before / spread) ** 2 * off
-    doubt = hypot(before * noise / spread, BENT * off)
-    return End(at, doubt, before, glide.goal + off, noise, odd, known.familiar)
+    bends = known.change * (glide.goal - reckoned)
+    hidden = (1.0 - shown) * BEFORE * known.share * known.place
+    noise, wrong = hypot(known.read, moved / FAR, bends, hidden), place - reckoned
+    spread = hypot(known.place, shown * known.goal, noise)
+    tells = (known.place**2 + shown * known.goal**2) / spread
+    doubt = hypot(sqrt(max(0.0, known.end**2 - tells**2)), BENT * wrong)
+    at, seen_at = glide.goal + tells / spread * wrong, glide.goal + wrong
+    unseen = (1.0 - shown) * _farther(glide.goal - glide.place)  # whatever experience says
+    alone, odd = hypot(noise, (1.0 - shown) * known.goal, unseen), abs(wrong) > OUTLIER * spread
+    return End(at, doubt, known.end, seen_at, alone, odd)
+
+
+def _farther(way: float) -> float:
+    """How much farther than its way a hop may go, degrees: now and then one does after many exact ones."""
+    return min(FARTHEST_DEG, FARTHER * abs(way))
+
+
+def _shown(glide: Glide, seen: float) -> float:
+    """How much of a change of its goal a look at a time shows: nothing before it brakes, all of it at rest."""
+    other = replace(glide, goal=glide.goal + (STEP_DEG if glide.goal >= glide.at(seen)[0] else -STEP_DEG))
+    return min(1.0, abs(other.at(seen)[0] - glide.at(seen)[0]) / STEP_DEG)
 
 
 def late(known: Sequence[Doubts]) -> float:
@@ -219,9 +219,7 @@ def judge(aim: Pose, near: float, told: Sequence[End]) -> Verdict:
 
 def _shows(aim: float, end: End) -> bool:
     """Whether the look by itself speaks for an end at the goal."""
-    if end.familiar:
-        return abs(aim - end.seen) <= max(NEAR_DEG, end.noise)
-    return abs(aim - end.seen) <= NEAR_DEG and (end.noise <= NOISE_DEG or end.before <= KNOWN_DEG)
+    return abs(aim - end.seen) <= max(NEAR_DEG, end.noise)
 
 
 def learn(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 
@@ -114,9 +114,12 @@ def timed(skill: Skill, hops: Sequence[Hop]) -> bool:
 
 
 def doubts(scale: Scale, hops: Sequence[Hop], axis: int) -> tuple[float, float]:
-    """Standard deviations of the end of a chain, degrees: because of its hops, because of where the first one began."""
-    told = _told(scale.planes, axis, hops, 0.0)
-    return hypot(told.doubt, told.noise, told.zoomed), told.before
+    """Standard deviations of a chain, degrees: of how far its last hop goes, and of where that begins."""
+    whole, last = (_told(scale.planes, axis, chain, 0.0) for chain in (hops, hops[-1:]))
+    moment = TIME_S * hops[-1].speeds[axis]
+    goes = sqrt(max(0.0, last.doubt**2 + last.noise**2 + last.zoomed**2 - moment**2))
+    end = hypot(whole.doubt, whole.noise, whole.zoomed, whole.before)
+    return goes, sqrt(max(0.0, end**2 - goes**2))
 
 
 def _weigh(

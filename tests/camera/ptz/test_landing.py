@@ -19,7 +19,6 @@ KNOWN = Doubts(goal=0.2, place=0.0, read=0.06, time=0.005, change=0.02)
 LATE = WAY.within(0.3)  # most of the braking is done then
 AIM: Pose = (40.0, 20.0, 0.0)
 STANDS = read(20.0, KNOWN)
-FAMILIAR = replace(KNOWN, goal=0.06, share=0.2)  # so little of all doubt is left by experience
 
 
 def test_a_look_that_is_as_was_reckoned_leaves_the_goal_and_little_doubt() -> None:
@@ -107,25 +106,56 @@ def test_it_has_arrived_where_it_surely_ends_at_the_goal() -> None:
     assert judge(AIM, 0.42, (end, STANDS)) == "there"
     assert judge(AIM, 0.42, (end, replace(STANDS, at=20.4, seen=20.4))) == "unsure"
     assert judge(AIM, 0.42, (replace(end, seen=40.5), STANDS)) == "unsure"
-    assert judge(AIM, 0.42, (replace(end, noise=0.5), STANDS)) == "unsure"
+    assert judge(AIM, 0.42, (replace(end, doubt=0.3), STANDS)) == "unsure"
     assert judge(AIM, 0.42, (replace(end, odd=True), STANDS)) == "unsure"
 
 
-def test_where_hops_are_familiar_a_look_on_the_way_may_be_as_far_off_as_its_noise() -> None:
+def test_a_look_on_the_way_may_be_as_far_off_as_its_noise() -> None:
     early = WAY.within(2.0)
-    end = foretell(WAY, early, WAY.at(early)[0], FAMILIAR)
+    end = foretell(WAY, early, WAY.at(early)[0], replace(KNOWN, goal=0.06))
     assert judge(AIM, 0.42, (end, STANDS)) == "there"
     assert judge(AIM, 0.42, (replace(end, seen=40.5, noise=0.6), STANDS)) == "there"
     assert judge(AIM, 0.42, (replace(end, seen=40.7, noise=0.6), STANDS)) == "unsure"
-    assert judge(AIM, 0.42, (replace(end, seen=40.5, noise=0.6, familiar=False), STANDS)) == "unsure"
 
 
-def test_where_hops_are_familiar_a_look_is_had_earlier_on_the_way() -> None:
+def test_the_less_is_in_doubt_the_earlier_on_the_way_a_look_is_had() -> None:
     skill, still = Skill(), replace(WAY, place=20.0, goal=20.0)
-    looks = [sight(skill, (WAY, still, still), (known, known)) for known in (FAMILIAR, replace(KNOWN, goal=0.06))]
-    assert looks[0] is not None
-    assert looks[1] is not None
-    assert WAY.brakes < looks[0] < looks[1] - 0.05
+    exact = replace(KNOWN, time=0.001, change=0.005, share=0.15)
+    known = [replace(exact, goal=0.06), replace(exact, goal=0.6), replace(exact, goal=0.6, time=0.01)]
+    looks = [sight(skill, (WAY, still, still), (one, one)) or 0.0 for one in known]
+    assert WAY.brakes - skill.read_late < looks[0] < looks[2] - 0.05
+    assert looks[0] <= looks[1] < looks[2]  # the slower it is, the less it matters of which moment a look is
+
+
+def test_where_a_hop_began_is_not_believed_before_it_brakes_unless_experience_leaves_little_doubt() -> None:
+    early, off = WAY.brakes, 0.3
+    place, known = WAY.at(early)[0] + off, replace(KNOWN, goal=0.05, place=0.3, time=0.001, change=0.005)
+    new, familiar = (foretell(WAY, early, place, replace(known, share=share)).at - 40.0 for share in (1.0, 0.15))
+    assert new < off / 2 < familiar < off
+
+
+def test_however_little_experience_leaves_in_doubt_a_look_shows_how_far_a_hop_goes() -> None:
+    short, still = replace(WAY, goal=WAY.place + 5.8), replace(WAY, place=20.0, goal=20.0)
+    known, skill = replace(KNOWN, goal=0.06, time=0.001, change=0.005, share=0.15), Skill()
+    when = sight(skill, (short, still, still), (known, known))
+    assert when is not None
+    seen = when + skill.read_late
+    assert seen > short.brakes + 0.02
+    farther = replace(short, goal=short.goal + 0.7)  # one of 5.8 degrees did that after many exact ones
+    told = foretell(short, seen, farther.at(seen)[0], known)
+    assert judge((short.goal, 20.0, 0.0), 0.42, (told, STANDS)) == "unsure"
+
+
+def test_doubt_of_the_hops_before_the_last_one_is_doubt_of_where_that_began() -> None:
+    skill, still = Skill(), (0.0, 0.0, 0.0)
+
+    def hop(way: float) -> Hop:
+        return Hop(still, (way / 180.0, 0.0), (way, 0.0, 0.0), still, (45.0, 27.0, 4.0), None, 1.0)
+
+    alone, chain = (doubts(skill, "moveRelatively", hops, 0.0)[0] for hops in ([hop(2.0)], [hop(40.0), hop(2.0)]))
+    assert alone.place == 0.0
+    assert chain.goal == pytest.approx(alone.goal)
+    assert chain.place > 5 * chain.goal
 
 
 @pytest.mark.parametrize(("doubt", "verdict"), [(0.1, "beside"), (0.24, "unsure"), (0.5, "unsure")])
