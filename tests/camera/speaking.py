@@ -5,7 +5,6 @@ The microphone gives a tone in A-law, in pieces of odd sizes, as fast as it is r
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +16,7 @@ import numpy as np
 from services.camera.sound import g711, wav
 from services.simulators.camera.digest import Door
 from services.simulators.camera.firmwares import PROFILES
+from tests.serving import serving
 
 PASSWORD = "secret123"
 
@@ -98,12 +98,5 @@ def speaking(
     profile: str = "ip3m-941w-2019", hz: float = 1000.0, content_type: str = "Audio/G.711A"
 ) -> Iterator[SpeakingCamera]:
     """One that runs until the context ends."""
-    server = SpeakingCamera(profile, hz, content_type)
-    thread = threading.Thread(target=server.serve_forever, args=(0.05,))
-    thread.start()
-    try:
+    with serving(SpeakingCamera(profile, hz, content_type)) as server:
         yield server
-    finally:
-        server.shutdown()
-        thread.join()
-        server.server_close()

@@ -7,8 +7,6 @@ import subprocess
 import threading
 import urllib.request
 import xmlrpc.client
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -17,6 +15,7 @@ import pytest
 from services.peers import ros, wait_until
 from tests.bridge.conftest import PATIENCE_S
 from tests.bridge.robots.test_on_ros import program
+from tests.serving import serving
 
 pytestmark = pytest.mark.ros
 PARAMETERS = ("getParam", "hasParam", "searchParam", "subscribeParam")
@@ -67,21 +66,9 @@ class Passing(BaseHTTPRequestHandler):
         """Nothing."""
 
 
-@contextmanager
-def gate(master: ros.Master, goes_at: int) -> Iterator[Gate]:
-    with Gate(master, goes_at) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-        thread.start()
-        try:
-            yield server
-        finally:
-            server.shutdown()
-            thread.join()
-
-
 @pytest.mark.parametrize("question", range(1, ASKED + 1))
 def test_a_robot_whose_master_goes_while_it_starts_is_there_when_it_comes(master: ros.Master, question: int) -> None:
-    with gate(master, question) as way:
+    with serving(Gate(master, question)) as way:
         behind = replace(master, port=way.server_address[1])
         with program(behind, "tests.bridge.robots.robot_process"):
             wait_until(lambda: way.away, "the question", PATIENCE_S)
