@@ -14,7 +14,8 @@ from services.payloads import CameraStatus
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0  # between attempts to reach a camera that is away
 MARGIN_S = 0.1  # so that the gate (`web/gate.py`) is open when it is asked again
-IDLE_S = 1.0  # between two readings of a camera at rest
+IDLE_S, REST_S = 1.0, 2.0  # between two readings of a camera that may turn; that has stood still, or just arrived
+STIRRED_S = 10.0  # so long ago
 
 State = Literal["online", "offline", "bad_login", "locked", "rebooting", "degraded"]
 log = logging.getLogger(__name__)
@@ -45,6 +46,13 @@ class Health:
         if self.online and self.stream:
             return CameraStatus(state="degraded", reason=self.stream)
         return CameraStatus(state=self.state, reason=self.reason)
+
+    def look_at(self, still_s: float) -> float:
+        """When it may be asked where it looks, after so long without a motion that was not ordered.
+
+        Less often where it stands still: an order that comes meanwhile waits for the answer.
+        """
+        return self.next_poll + (REST_S - IDLE_S if self.online and still_s > STIRRED_S else 0.0)
 
     def take(self, reply: Reply) -> None:
         """Judges one reply. A refusal is an answer too: the camera is there."""

@@ -23,7 +23,7 @@ from services.camera.commands import VideoMode
 from services.camera.device import REPLY, Sender
 from services.camera.discovery import Discovery
 from services.camera.early import Early
-from services.camera.health import IDLE_S, Health
+from services.camera.health import Health
 from services.camera.orders import Command, GotoPlace, LookAt
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
@@ -46,7 +46,6 @@ BUSY_S = 0.5  # between two looks whether the motors are free again
 BROKER_LOST = "the connection to the broker was lost"
 FREE = WITHOUT_CAMERA | orders.Halt | orders.EndScan  # can be done while the camera is away,
 IN_TURN = orders.Broadcast | orders.EndScan  # these not before what came earlier
-STIRRED_S, REST_S = 10.0, 2.0  # a camera that stood still for so long is asked so often only
 TOPICS = (
     topics.CAMERA_ORDER,
     topics.CAMERA_POSITION_SET,
@@ -194,14 +193,14 @@ class CameraService:
         """Asks where the camera looks while nobody else does, and who it is after it was away."""
         met = False
         while True:
-            now = yield from wait(max(now + 0.05, self.health.next_poll))
+            now = yield from wait(max(now + 0.05, self.health.look_at(self.bulletin.still_for(now))))
             if self.motors.busy or self.health.rebooting:
                 met = met and not self.health.rebooting
                 now = yield from wait(now + BUSY_S)
                 continue
+            if now < self.health.look_at(self.bulletin.still_for(now)):
+                continue  # it was read meanwhile, by a move that is over
             now = (yield from attempt(Status())).received
-            if self.health.online and self.bulletin.still_for(now) > STIRRED_S:
-                self.health.next_poll += REST_S - IDLE_S
             if self.health.online and not met:
                 self.early.waits = True
                 yield from attempt(Identify())

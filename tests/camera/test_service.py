@@ -103,7 +103,29 @@ def test_an_order_some_seconds_after_another_one_needs_no_reading_to_begin_with(
     for number in range(60):
         assert looks_before(saying, number) <= 1 or number < 2  # the one that was on its way
         assert saying.payloads("position")[-1]["moving"] is False
-        saying.run(1.5)  # between the first two looks after it
+        saying.run(1.5 + 0.05 * number)  # before the first look after it, and after that
+
+
+def test_a_camera_that_has_just_arrived_is_left_in_peace_for_two_seconds(saying: Flat) -> None:
+    saying.run(5)
+    for number, place in enumerate(("Door", "Sofa", "Kitchen")):
+        saying.order("Goto", place, order_id=str(number))
+        saying.until(lambda number=number: saying.ended(str(number)))  # type: ignore[misc]
+        before = len(saying.motors.sent)
+        saying.run(1.5)
+        assert not [one for one in saying.motors.sent[before:] if isinstance(one, Status)]
+        saying.run(1.5)
+        assert [one for one in saying.motors.sent[before:] if isinstance(one, Status)]
+
+
+def test_a_camera_that_somebody_else_turns_is_followed_every_second(flat: Flat) -> None:
+    flat.run(30)
+    flat.motors.answer(Start(Direction.LEFT, 1))  # by the maker's app
+    flat.run(5)
+    before = len(flat.motors.sent)
+    flat.run(10)
+    assert sum(isinstance(one, Status) for one in flat.motors.sent[before:]) >= 6  # each takes a while itself
+    assert flat.payloads("position")[-1]["moving"] is True
 
 
 def test_an_order_after_a_long_rest_needs_no_reading_to_begin_with(saying: Flat) -> None:
