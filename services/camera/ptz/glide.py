@@ -38,20 +38,22 @@ class Glide:
         return self.began + sum(seconds for seconds, _, _ in self._pieces())
 
     def within(self, left: float) -> float:
-        """When no more than that is left of its way; not before it slows down for its goal."""
-        return max(self.brakes, self.ends - sqrt(2 * left / self.acceleration))
-
-    def nears(self, left: float) -> float:
-        """The same at whatever speed it is then; not before it is as fast as it gets."""
-        *_, (seconds, top, _), (slows, _, _) = [(0.0, 0.0, 0.0)] * 2 + self._pieces()
-        faster = left - abs(top) * slows / 2
-        return self.brakes - min(seconds, faster / abs(top)) if faster > 0 and top else self.within(left)
+        """When no more than that is left of its way; not before it has turned round, where it does."""
+        when, nearer = self.ends, 0.0
+        for seconds, begins, change in reversed(self._pieces()[-3:]):  # what comes before is the way out
+            speed, change = abs(begins + change * seconds), copysign(change, begins * change) if begins else abs(change)
+            way = speed * seconds - change * seconds * seconds / 2
+            if nearer + way >= left:
+                root = sqrt(max(0.0, speed * speed - 2 * change * (left - nearer)))
+                return when - 2 * (left - nearer) / (speed + root) if speed + root else when
+            when, nearer = when - seconds, nearer + way
+        return when
 
     @property
     def brakes(self) -> float:
         """When it begins to slow down for its goal."""
         pieces = self._pieces()
-        return self.began + sum(seconds for seconds, _, _ in pieces[:-1]) if len(pieces) == 3 else self.began
+        return self.began + sum(seconds for seconds, _, _ in pieces[:-1]) if len(pieces) >= 3 else self.began
 
     def _pieces(self) -> list[tuple[float, float, float]]:
         """Seconds, the speed they begin with, and its change."""

@@ -3,7 +3,7 @@
 A hop may begin while the last one, or a start at full speed, still turns. Where it leads depends on where the camera
 was just then: that is known when it was answered, not before, so the last hop of a long way leaves some degrees to
 one more that begins at rest. A late hop pushes nothing against a stop. Zoom turns by hops only, so where it takes
-long they begin sooner. A look on the last bit of the way tells whether to go on from where that leads. Not here: the
+long they begin sooner. A look on the last part of the way tells whether to go on from where that leads. Not here: the
 start at full speed before hops (`rush.py`), how an axis glides (`glide.py`), where it will rest (`landing.py`), how
 large the scale is (`planes.py`), what hops teach (`scale.py`).
 """
@@ -11,7 +11,7 @@ large the scale is (`planes.py`), what hops teach (`scale.py`).
 from __future__ import annotations
 
 from dataclasses import replace
-from math import copysign
+from math import copysign, hypot
 from typing import cast
 
 from services.camera.plan import Plan, wait
@@ -20,7 +20,7 @@ from services.camera.ptz.arriving import Arriving
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
-from services.camera.ptz.helm import RESTS_S, Helm, sign
+from services.camera.ptz.helm import RESTS_S, Helm
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE
 from services.camera.ptz.planes import Planes, Scale
 from services.camera.ptz.rush import rush
@@ -39,8 +39,6 @@ SHARP_DEG = 0.05  # what the reckoning leaves open, at least
 FAR_DEG = 360.0  # no hop goes farther
 TRY_DEG = 12.0  # a first hop, whose scale is a guess
 SHORT, KNOWN = 0.5, 0.4  # spreads: a hop in flight ends before its goal, where no more of the doubt is left
-BACK_DEG_S = 2.0  # of a hop that turns one round: a look may be of the way out, or of the way back
-LATEST = 1.25  # spreads: when a hop acted that was answered later is not known well enough to foretell where it leads
 FEW, LAST = 2, 1  # commands, for a hop from rest and a look; for a look, which has to be one at rest then
 
 
@@ -56,7 +54,6 @@ class Hopping:
         self.zooming = Glide(0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0)  # zoom's since it last stood
         self.hops: list[Hop] = []
         self.foretold = 0.0  # degrees: doubt of where the hops began, where that was foretold
-        self.latest = 0.0  # seconds: how much later than usual a hop was answered at most
 
     def hop(self, now: float) -> Plan[tuple[Reading, float] | None]:
         """Goes to the goal, or near; None where the firmware has no such form, or it did not help."""
@@ -86,7 +83,7 @@ class Hopping:
         """A chain of hops, or one that is a try, to rest."""
         certain = self._honoured == "yes"
         self.turns += 1
-        self.glides, self.hops, self.foretold, self.latest = [], [], 0.0, 0.0
+        self.glides, self.hops, self.foretold = [], [], 0.0
         now = yield from (self._chain(now) if certain else self._send(now, TRY_DEG))
         landed = (yield from self._land(now)) if certain else None
         if landed is not None:
@@ -107,7 +104,7 @@ class Hopping:
 
     def _learn(self, reading: Reading, to: Pose, *, certain: bool) -> None:
         """What a reading at rest tells of the hops that should lead `to` there."""
-        if certain and self._timely:
+        if certain:
             known = landing.doubts(self.helm.skill, self.form, self.hops, self.foretold)
             rest = [landing.read(*one) for one in zip(self.helm.limits.pose(reading), known, strict=False)]
             landing.stray(self._scale, self.glides, known, rest)
@@ -120,9 +117,9 @@ class Hopping:
         return not skill.says_late and off + 2 * unsure <= EXACT_DEG and scale.timed(skill, self.hops)
 
     def _land(self, now: float) -> Plan[tuple[Reading, float] | None]:
-        """Looks on the last bit of way, and hops on where that leads beside the goal; None: it is not sure where."""
+        """Looks near the end of the way, and hops on where that leads beside the goal; None: it is not sure where."""
         helm = self.helm
-        while helm.left > LAST and self._timely:
+        while helm.left > LAST:
             doubts = landing.doubts(helm.skill, self.form, self.hops, self.foretold)
             look = landing.sight(helm.skill, self.glides, doubts)
             if look is None:
@@ -156,15 +153,6 @@ class Hopping:
     @property
     def _honoured(self) -> str:
         return self.helm.skill.honours.get(self.form, "unknown")
-
-    @property
-    def _timely(self) -> bool:
-        """Whether it is known when the hops acted, and from where the last one goes."""
-        if len(self.hops) > 1:
-            last = self.hops[-1]
-            if any(last.speeds[axis] * sign(last.ways[axis]) < -BACK_DEG_S for axis in (PAN, TILT)):
-                return False
-        return self.latest <= LATEST * self.helm.skill.timing.spread
 
     @property
     def _scale(self) -> Scale:
@@ -222,8 +210,9 @@ class Hopping:
         """Where it leads, now that it is known from where."""
         helm = self.helm
         late = helm.skill.timing.late(reply)
-        self.latest = max(self.latest, late)
-        acted = reply.received - helm.skill.paces[PAN].other(ACT_PART) * late
+        acts = helm.skill.paces[PAN]
+        acted = reply.received - acts.other(ACT_PART) * late
+        moment = hypot(scale.TIME_S, acts.other_doubt(ACT_PART) * late)
         poses = [self._at(axis, acted) for axis in range(3)]
         pan, tilt = (
             part * sense.sign for part, sense in zip((request.right, request.down), helm.skill.senses, strict=False)
@@ -243,7 +232,7 @@ class Hopping:
         zoomed = copysign(acted - self.zooming.began, speeds[ZOOM]) if speeds[ZOOM] else 0.0
         unsure = abs(zoomed) * helm.skill.drive(ZOOM).doubt(1)
         self.hops.append(
-            Hop(begun, (pan, tilt), (right, down, request.zoom), speeds, tops, turned, rested, zoomed, unsure)
+            Hop(begun, (pan, tilt), (right, down, request.zoom), speeds, tops, turned, rested, zoomed, unsure, moment)
         )
         if not zoomed:
             self.zooming = self.glides[ZOOM]

@@ -1,4 +1,4 @@
-"""Where an axis that the firmware drives will rest, told by a look on the last bit of its way. Pure.
+"""Where an axis that the firmware drives will rest, told by a look on the last part of its way. Pure.
 
 A look tells of the moment when it was asked for and is answered a while later: asked for at rest it costs that time,
 asked for while the camera brakes the camera rests when the answer comes. Where it will rest is then reckoned, from how
@@ -29,6 +29,7 @@ LEFT_DEG = (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, the most
 LEFT_LEVELS = 0.6  # of zoom's way, at most, where it is told in coarse steps
 EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
 EXPECTED_NOISE_DEG = 0.3  # and whose own noise is no more
+STAYS_DEG = 0.3  # an axis that should go farther has to be seen on its way
 LATER = 0.1  # of the spread of answers: so much later, since a quick one is before its time
 
 # What is known without a look, and how exact one is; standard deviations.
@@ -103,21 +104,21 @@ def doubts(skill: Skill, form: RelativeForm, hops: Sequence[Hop], place: float) 
         goes, begins = scale.doubts(skill.scales[form], hops, axis)
         change = skill.paces[axis].other_doubt(HALF_CHANGE) / skill.paces[axis].other(HALF_CHANGE)
         goal = share * hypot(goes, _farther(hops[-1].ways[axis]))
-        start = _start(skill, hops, axis, share * change)
+        start = _start(skill, hops, axis, share * change, share * hops[-1].moment)
         began = hypot(share * begins, place)
         return Doubts(hypot(goal, LEAST_DEG), began, READ_DEG, time, share * change, start, share)
 
     return of(PAN), of(TILT)
 
 
-def _start(skill: Skill, hops: Sequence[Hop], axis: int, change: float) -> float:
+def _start(skill: Skill, hops: Sequence[Hop], axis: int, change: float, moment: float) -> float:
     """How much sooner or later than is reckoned the last hop is where it should be, seconds.
 
     It may take longer itself, and the one whose place it took may not have ended when it acted; `change`: doubt of the
-    acceleration, a share.
+    acceleration, a share; `moment`: of when it acted, seconds.
     """
     before = ENDED * max(0.0, _lasts(skill, hops[-2], axis, change) - hops[-1].rested) if len(hops) > 1 else 0.0
-    return hypot(before, _lasts(skill, hops[-1], axis, change))
+    return hypot(before, _lasts(skill, hops[-1], axis, change), moment)
 
 
 def _lasts(skill: Skill, hop: Hop, axis: int, change: float) -> float:
@@ -144,13 +145,19 @@ def _time(skill: Skill, late: float, share: float) -> float:
 def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> float | None:
     """When to ask for a look that tells where pan and tilt will rest, the earliest; None: no look would."""
     turning = glides[:ZOOM]
-    zoomed = glides[ZOOM].nears(LEFT_LEVELS if skill.zoom_grid else 0.0)
+    zoomed = glides[ZOOM].within(LEFT_LEVELS if skill.zoom_grid else 0.0)
     for left in LEFT_DEG:
         when = max(zoomed, *(glide.within(left) for glide in turning))
         told = [foretell(glide, when, glide.at(when)[0], known[axis]) for axis, glide in enumerate(turning)]
-        if all(end.doubt <= EXPECTED_DOUBT_DEG and end.noise <= EXPECTED_NOISE_DEG for end in told):
+        enough = all(end.doubt <= EXPECTED_DOUBT_DEG and end.noise <= EXPECTED_NOISE_DEG for end in told)
+        if enough and all(_shows_moving(glide, when, known[axis]) for axis, glide in enumerate(turning)):
             return when - skill.read_late + LATER * skill.timing.spread
     return None
+
+
+def _shows_moving(glide: Glide, when: float, known: Doubts) -> bool:
+    """Whether a look at a time would show if it stayed where it was, so far from its goal that it matters."""
+    return abs(glide.goal - glide.place) <= STAYS_DEG or foretell(glide, when, glide.place, known).odd
 
 
 def foretell(glide: Glide, seen: float, place: float, known: Doubts) -> End:

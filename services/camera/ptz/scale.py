@@ -18,7 +18,7 @@ from services.camera.requests import Reading
 STAYED_DEG = 0.3
 FAR_DEG = 3.0  # a shorter way is no measure for how far off it ended
 OFF_COUNTS, OFF_MOST = 0.2, 0.25  # of a way: what each chain of hops adds to what is usual, and how far off is too far
-READ_DEG, TIME_S = 0.08, 0.003  # of a reading; when a hop took effect
+READ_DEG, TIME_S = 0.08, 0.003  # of a reading; when a hop took effect that was answered as usual
 LEVELS = 0.5  # where zoom is while it turns, beside the doubt of its rate
 ZOOMED = 0.4  # of the doubt about where zoom was, for what a hop tells of the scale
 KNOWN = 0.08  # of zoom's rate: as well known as that, it is told more exactly by where hops led
@@ -46,6 +46,7 @@ class Hop:
     `parts` as the readings count, of pan and tilt; the others in degrees and levels. `turned`: what pan and tilt did
     before, where the hop is the first one; `rested`: how many seconds they had, where another one was before. `zoomed`:
     for so many seconds zoom had been on its way, with the sign of that, 0 at rest; `unsure`: levels that leaves open.
+    `moment`: doubt of when it took effect, seconds.
     """
 
     begun: Pose
@@ -57,6 +58,7 @@ class Hop:
     rested: float
     zoomed: float = 0.0
     unsure: float = 0.0
+    moment: float = TIME_S
 
 
 def zooms(form: RelativeForm) -> str:
@@ -116,7 +118,7 @@ def timed(skill: Skill, hops: Sequence[Hop]) -> bool:
 def doubts(scale: Scale, hops: Sequence[Hop], axis: int) -> tuple[float, float]:
     """Standard deviations of a chain, degrees: of how far its last hop goes, and of where that begins."""
     whole, last = (_told(scale.planes, axis, chain, 0.0) for chain in (hops, hops[-1:]))
-    moment = TIME_S * hops[-1].speeds[axis]
+    moment = hops[-1].moment * hops[-1].speeds[axis]
     goes = sqrt(max(0.0, last.doubt**2 + last.noise**2 + last.zoomed**2 - moment**2))
     end = hypot(whole.doubt, whole.noise, whole.zoomed, whole.before)
     return goes, sqrt(max(0.0, end**2 - goes**2))
@@ -192,7 +194,7 @@ def _told(planes: Planes, axis: int, hops: Sequence[Hop], read: float) -> _Told:
         bends = share * planes.bends(way)
         beside += share * (way - hop.ways[axis])
         slope += bends * planes.weights(axis, hop.begun[ZOOM])
-        noise = hypot(noise, share * TIME_S * hop.speeds[axis])
+        noise = hypot(noise, share * hop.moment * hop.speeds[axis])
         if hop.speeds[ZOOM]:
             grows = bends * planes.growth(hop.begun[ZOOM])
             noise = hypot(noise, LEVELS * grows)

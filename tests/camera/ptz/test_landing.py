@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite
+from math import hypot, isfinite
 
 import pytest
 
@@ -75,6 +75,32 @@ def test_where_a_long_way_at_a_speed_that_is_not_quite_known_is_over_a_look_tell
     ]
     assert after[0].start > far / 2  # the hop before may not have been over
     assert after[1].start < 0.02
+
+
+def test_the_later_than_usual_a_hop_acted_the_less_is_known_of_where_it_began_and_when_it_ends() -> None:
+    skill, still = Skill(), (0.0, 0.0, 0.0)
+    rest = Hop(still, (0.1, 0.0), (18.0, 0.0, 0.0), still, (45.0, 27.0, 4.0), None, 1.0)
+    flight = replace(rest, speeds=(-30.0, 0.0, 0.0))
+    usual, late = (
+        [doubts(skill, "moveRelatively", [replace(hop, moment=moment)], 0.0)[0] for hop in (rest, flight)]
+        for moment in (0.003, 0.05)
+    )
+    assert [one.start for one in late] == pytest.approx([hypot(one.start, 0.05 * one.share) for one in usual], rel=0.01)
+    assert usual[0].place == late[0].place == 0.0  # at rest it is the same whenever it acts
+    assert late[1].place > usual[1].place + 0.5
+    assert late[1].goal == pytest.approx(usual[1].goal)
+
+
+def test_a_short_hop_is_looked_at_before_it_brakes_but_not_before_that_shows_whether_it_goes() -> None:
+    short, still = replace(WAY, goal=WAY.place + 2.0), replace(WAY, place=20.0, goal=20.0)
+    known, skill = replace(KNOWN, goal=0.06, time=0.001, change=0.005, share=0.15), Skill()
+    when = sight(skill, (short, still, still), (known, known))
+    assert when is not None
+    seen = when + skill.read_late
+    assert short.began < seen < short.brakes
+    stays = foretell(short, seen, short.place, known)
+    assert stays.odd
+    assert judge((short.goal, 20.0, 0.0), 0.42, (stays, STANDS)) == "unsure"
 
 
 @pytest.mark.parametrize("way", [0.0, 1e-9, -1e-9, -30.0])
