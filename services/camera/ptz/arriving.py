@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import sqrt
 from typing import cast
@@ -20,7 +21,7 @@ from services.camera.requests import Reading, Reply, Status
 FEW = 3  # commands left
 LOOKS = 30  # less and less often
 LONG_S = 2.0  # apart, at most
-GOOD, MOST = 1.4, 2.0  # of what should be left of that: it was not looked at too soon; more tells nothing
+MOST_DEG = 3.0  # of the way left: more tells nothing of its end
 NEWER, NEWEST_S = 2.0, 0.1  # standard deviations that a reading may be newer than is known, and at most
 READ_DEG, LONGER = 0.1, 1.3  # of a reading; than is reckoned an axis may take to slow down
 
@@ -30,9 +31,9 @@ class Arriving:
     """One such end. `to`: where it leads; `zooming`: the way of zoom; `certain`: it is known exactly where that leads.
 
     `about`: that is not known quite exactly, but so few degrees; there one look is enough if it tells of rest. `hops`:
-    it may be beyond its end and return, so it is not there while it says that it moves. `left`: where the firmware is
-    known to end where it should, so much of the way may be left. `ended`: tilt does not go there, but rests from then
-    on.
+    it may be beyond its end and return, so it is not there while it says that it moves. `turning`: the ways of pan
+    and tilt, where the firmware is known to end where it should; there what is on its way, as is reckoned, is as good
+    as there. `ended`: tilt does not go there, but rests from then on.
     """
 
     helm: Helm
@@ -41,7 +42,7 @@ class Arriving:
     certain: bool
     about: float = 0.0
     hops: bool = False
-    left: float = 0.0
+    turning: Sequence[Glide] = ()
     ended: float = 0.0
     seen: list[Reading] = field(default_factory=list, init=False)
     arrives: float = field(default=0.0, init=False)  # when it should rest
@@ -50,7 +51,7 @@ class Arriving:
     since: float = field(default=FOREVER, init=False)  # the latest reading is the same since then
 
     def at_rest(self, nears: float, arrives: float, now: float) -> Plan[tuple[Reading, float, bool]]:
-        """Looks from about the moment on when no more than `left` of the way should be left.
+        """Looks from about the moment on when it nears its end.
 
         Returns the reading, when it rests, and whether that surely shows the camera at rest.
         """
@@ -63,7 +64,7 @@ class Arriving:
                 break
             yield from wait(reply.sent + min(LONG_S, PAIR_S * (len(self.seen) - 1)))
         if self.certain and (self._there or not same(self.seen[0], self.seen[-1])):
-            skill.expect_arrival(there=len(self.seen) == 1 and self.off <= self._good)
+            skill.expect_arrival(there=len(self.seen) == 1 and self._good)
         still = self._still(reply.sent)
         if still or skill.tells_rest(self.seen[-1].moving):
             return self.seen[-1], reply.received, self._rests or still
@@ -93,15 +94,19 @@ class Arriving:
         return replace(seen, pan=round(self.to[PAN] % 360.0, 2), tilt=tilt, moving=None)
 
     @property
-    def _good(self) -> float:
-        """So near, and at the first look, it was not looked at too soon."""
-        return max(THERE_DEG, self.about, GOOD * self.left)
+    def _good(self) -> bool:
+        """Whether it was not looked at too soon, at the first look."""
+        return self.off <= max(THERE_DEG, self.about) or self._on_way
 
     @property
     def off(self) -> float:
         """How far pan and tilt are from where they should be, degrees."""
         pose = self.helm.limits.pose(self.seen[-1])
-        return max(abs(pose[axis] - self.to[axis]) for axis in ((PAN,) if self.ended else (PAN, TILT)))
+        return max(abs(pose[axis] - self.to[axis]) for axis in self._axes)
+
+    @property
+    def _axes(self) -> tuple[int, ...]:
+        return (PAN,) if self.ended else (PAN, TILT)
 
     @property
     def _rests(self) -> bool:
@@ -119,8 +124,17 @@ class Arriving:
     @property
     def _near(self) -> bool:
         """Whether pan and tilt are where they should be, or on a last bit of way that leads there."""
-        turns = self.when < self.arrives and not self.helm.skill.tells_rest(self.seen[-1].moving)
-        return self.off <= NEARER_DEG or (turns and self.off <= MOST * self.left)
+        return self.off <= NEARER_DEG or self._on_way
+
+    @property
+    def _on_way(self) -> bool:
+        """Whether pan and tilt still turn, and are where they should be then."""
+        if self.when >= self.arrives or self.off > MOST_DEG or self.helm.skill.tells_rest(self.seen[-1].moving):
+            return False
+        pose = self.helm.limits.pose(self.seen[-1])
+        return bool(self.turning) and all(
+            abs(pose[axis] - self.turning[axis].at(self.when)[0]) <= NEARER_DEG for axis in self._axes
+        )
 
     @property
     def _goes_there(self) -> bool:

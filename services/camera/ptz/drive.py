@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import sqrt
 from typing import Literal
 
 from services.camera.ptz import zoom_drive
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
-from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told
+from services.camera.ptz.pace import HALF_CHANGE, Seen, Told
 from services.camera.ptz.skill import Skill
 from services.camera.requests import GotoPreset, MoveTo, Reply
 
@@ -25,8 +24,8 @@ PRESET_DEG = 2.0  # a preset as near to the goal as that is worth going to
 PRESET_LEVELS = 0.5
 BESIDE_DEG = 6.0  # farther from what was asked for, it was not honoured
 LEAST_DEG = 0.3
-ZOOM_LATE_S = 0.04  # it may still slow down when its coarse reading is the last one
 NOISE_DEG, NOISE_S = 0.2, 0.03  # of a reading on the way
+REST: Pose = (0.0, 0.0, 0.0)
 WITHIN_DEG = 0.1  # what is asked for stays so far from an end stop
 
 
@@ -42,25 +41,29 @@ class Drive:
 class Begun:
     """One under way: from where, and the answer that it began with.
 
-    `ended`: tilt does not go there, but was ended by it and rests from then on; 0: it does.
+    `speeds`: how fast pan, tilt and zoom turned then; `ended`: tilt does not go there, but was ended by it and rests
+    from then on; 0: it does.
     """
 
     drive: Drive
     here: Pose
     reply: Reply
+    speeds: Pose = REST
     ended: float = 0.0
 
-    def zooming(self, skill: Skill) -> Glide:
-        """The way of zoom."""
-        return zoom_drive.begin(skill, self.here[ZOOM], self.drive.to[ZOOM], self.reply.received)
+    def ways(self, skill: Skill) -> tuple[Glide, Glide, Glide]:
+        """Of pan, tilt and zoom, as far as is known by now."""
+        return ways(skill, self.here, self.drive.to, self.reply.received, self.speeds)
 
     def arrives(self, skill: Skill) -> float:
         """When it should be there, as far as is known by now."""
-        return self.nears(skill, 0.0)
+        return max(self.ended, *(glide.ends for glide in self.ways(skill)))
 
     def nears(self, skill: Skill, left: float) -> float:
-        """When no more than so many degrees of pan and tilt should be left, and all of zoom be done."""
-        return max(self.ended, self.reply.received + longest(skill, self.here, self.drive.to, left))
+        """When no more than so many degrees of pan and tilt should be left, and of zoom what its reading hides."""
+        pan, tilt, zoom = self.ways(skill)
+        zoomed = zoom.within(zoom_drive.unread(skill) if left else 0.0)
+        return max(self.ended, pan.within(left), tilt.within(left), zoomed)
 
     def look(self, skill: Skill, reply: Reply, seen: Pose) -> None:
         """What a look tells of its speed, on the axes that do not slow down yet; `seen`: its reading as a pose."""
@@ -73,7 +76,7 @@ class Begun:
                 told = [Told(self.reply.received, timing.late(self.reply), 1)]
                 pace.learn(told, Seen(reply.sent, timing.late(reply), travel, NOISE_DEG + NOISE_S * pace.rate(1)))
                 pace.age()
-        zoom_drive.see(skill, self.zooming(skill), reply)
+        zoom_drive.see(skill, self.ways(skill)[ZOOM], reply)
 
 
 def find(
@@ -111,20 +114,20 @@ def _preset(pose: Pose, aim: Pose, limits: Limits, presets: Mapping[int, tuple[f
     return None
 
 
-def seconds(pace: Pace, distance: float, left: float = 0.0) -> float:
-    """How long the firmware needs for one axis, from rest to rest, or until so little is left while it slows down."""
-    rate, slow = pace.rate(1), 2 * pace.other(HALF_CHANGE)
-    last = sqrt(2 * slow * min(left, distance / 2))
-    if distance < slow * rate * rate:
-        return 2 * sqrt(distance * slow) - last
-    return distance / rate + slow * rate - last
+def ways(skill: Skill, here: Pose, there: Pose, began: float, speeds: Pose = REST) -> tuple[Glide, Glide, Glide]:
+    """How the firmware drives all axes there, from the speeds that they have."""
+
+    def of(axis: int) -> Glide:
+        pace = skill.drive(axis)
+        acceleration = pace.rate(1) / pace.change(1)
+        return Glide(began, here[axis], speeds[axis], there[axis], pace.rate(1), acceleration, began)
+
+    return of(PAN), of(TILT), of(ZOOM)
 
 
-def longest(skill: Skill, here: Pose, there: Pose, left: float = 0.0) -> float:
-    """How long the firmware needs for all axes; or until so many degrees of pan and tilt are left."""
-    ways = (abs(b - a) for a, b in zip(here, there, strict=True))
-    pan, tilt, zoom = (seconds(skill.drive(axis), way, 0.0 if axis == ZOOM else left) for axis, way in enumerate(ways))
-    return max(pan, tilt, zoom + ZOOM_LATE_S if zoom else 0.0)
+def longest(skill: Skill, here: Pose, there: Pose) -> float:
+    """How long the firmware needs for all axes, from rest to rest, seconds."""
+    return max(glide.ends for glide in ways(skill, here, there, 0.0))
 
 
 def judge(skill: Skill, here: Pose, drive: Drive, there: Pose) -> None:

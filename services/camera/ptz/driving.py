@@ -73,7 +73,8 @@ def follow(helm: Helm, drive: own.Begun, *, certain: bool, proven: bool) -> Plan
         drive.look(skill, reply, helm.limits.pose(cast(Reading, reply.result)))
         arrives = drive.arrives(skill)
     left = LEFT_DEG if proven and skill.exact >= EXACT else 0.0
-    end = Arriving(helm, way.to, drive.zooming(skill), certain, left=left, ended=drive.ended)
+    *turning, zooming = drive.ways(skill)
+    end = Arriving(helm, way.to, zooming, certain, turning=turning if left else (), ended=drive.ended)
     reading, now, rests = yield from end.at_rest(drive.nears(skill, left), arrives, now)
     helm.rests, helm.foretold = arrives, reading is not end.seen[-1]
     skill.foretold = helm.limits.pose(reading) if helm.foretold else None

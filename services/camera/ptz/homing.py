@@ -84,13 +84,15 @@ class Homing:
         helm = self.helm
         pan, tilt, zoom = (helm.course.stopped(axis, now) for axis in range(3))
         request = own.to_pan((pan, tilt, zoom), helm.aim)
-        begun, pace, level = (yield from helm.send(request)), helm.skill.paces[TILT], abs(helm.course.levels[TILT])
-        tilt = helm.course.stopped(TILT, begun.received)
-        ended = begun.received + pace.change(level)
-        helm.course.leave((pan, tilt, zoom))
+        begun = yield from helm.send(request)
+        acted, course = begun.received, helm.course
+        tilt, ended = course.stopped(TILT, acted), acted + helm.skill.paces[TILT].change(abs(course.levels[TILT]))
+        here = (course.at(PAN, acted), tilt, zoom)
+        speeds = (helm.skill.paces[PAN].velocity(course.told[PAN], acted), 0.0, 0.0)
+        course.leave(here)
         helm.zoom_ends = None
         to = (helm.aim[PAN], tilt, helm.goal.pose[ZOOM])
-        drive = own.Begun(own.Drive(request, to), (pan, tilt, zoom), begun, ended)
+        drive = own.Begun(own.Drive(request, to), here, begun, speeds, ended)
         reading, now, _ = yield from follow(helm, drive, certain=True, proven=True)
         return reading, now
 

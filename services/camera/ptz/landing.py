@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from math import hypot, sqrt
 from typing import Literal, cast
 
-from services.camera.ptz import scale
+from services.camera.ptz import scale, zoom_drive
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
@@ -26,7 +26,6 @@ from services.camera.requests import Reading, Reply
 
 # When to look.
 LEFT_DEG = (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, the most that tells enough
-LEFT_LEVELS = 0.6  # of zoom's way, at most, where it is told in coarse steps
 EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
 EXPECTED_NOISE_DEG = 0.3  # and whose own noise is no more
 STAYS_DEG = 0.3  # an axis that should go farther has to be seen on its way
@@ -145,7 +144,7 @@ def _time(skill: Skill, late: float, share: float) -> float:
 def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> float | None:
     """When to ask for a look that tells where pan and tilt will rest, the earliest; None: no look would."""
     turning = glides[:ZOOM]
-    zoomed = glides[ZOOM].within(LEFT_LEVELS if skill.zoom_grid else 0.0)
+    zoomed = glides[ZOOM].within(zoom_drive.unread(skill))
     for left in LEFT_DEG:
         when = max(zoomed, *(glide.within(left) for glide in turning))
         told = [foretell(glide, when, glide.at(when)[0], known[axis]) for axis, glide in enumerate(turning)]

@@ -16,13 +16,13 @@ from services.camera.requests import Reading, Reply
 
 SLOWER = 0.01  # it may last longer than that, for all that is known
 SURE = 0.4  # of its rate may be in doubt
+UNREAD_LEVELS = 0.6  # where it is told in coarse steps
 NOISE_LEVELS = 0.5  # of where it was on its way, at the edge of a step of its reading
 
 
-def begin(skill: Skill, here: float, to: float, acted: float) -> Glide:
-    """Its way from rest, levels; `acted`: when that begins."""
-    pace = skill.drive(ZOOM)
-    return Glide(acted, here, 0.0, to, pace.rate(1), pace.rate(1) / pace.change(1), acted)
+def unread(skill: Skill) -> float:
+    """So much of its way, at most, may be left where it is read to be there, levels."""
+    return UNREAD_LEVELS if skill.zoom_grid else 0.0
 
 
 def see(skill: Skill, glide: Glide, reply: Reply) -> None:

@@ -8,7 +8,7 @@ from typing import cast
 import pytest
 
 from services.camera.ptz.skill import Skill
-from services.camera.requests import MoveTo, Reading, Request, Status
+from services.camera.requests import MoveTo, Reading, Reply, Request, Status
 from services.simulators.camera.firmwares import PROFILES
 from tests import bounds
 from tests.camera.goals import LIMITS, Goal, Outcome, Rig, random_goals
@@ -58,6 +58,20 @@ def test_where_the_firmware_ends_pan_itself_one_look_on_its_last_bit_of_way_is_e
         rig.now += 1.0
     assert len(ends) > bounds.GOALS / 2
     assert sum(looks == 1 for looks in ends) >= 0.9 * len(ends)
+
+
+def test_where_the_firmware_ends_pan_and_zoom_itself_the_last_look_is_asked_for_before_they_rest() -> None:
+    rig, early = Rig(PROFILES["dahua-pan-only"], 1), []
+    rig.calibrate()
+    for goal in random_goals(bounds.GOALS, 1):
+        sent: list[Reply] = []
+        rig.log = sent.append
+        assert rig.go(goal).rests
+        if [type(reply.request) for reply in sent[-2:]] == [MoveTo, Status]:
+            early.append(any(rig.device.motion(sent[-1].sent)[1]))
+        rig.now += 1.0
+    assert len(early) > bounds.GOALS / 2
+    assert sum(early) >= 0.8 * len(early)
 
 
 @pytest.mark.parametrize("name", ["ip4m-1041b", "2020s-dahua"])
