@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from itertools import islice
 from typing import cast
 
@@ -95,6 +97,26 @@ def test_after_one_did_not_stay_where_it_should_have_ended_moves_are_looked_at_t
     rig.near = cast(Reading, rig.client.send(Status()))  # as the service polls it
     assert max(_went(rig, goal)[1] for goal in islice(goals, 3)) <= bounds.OFF_DEG
     assert any(_went(rig, goal)[1] > bounds.OFF_DEG for goal in goals)
+
+
+def test_one_that_somebody_leads_beside_its_way_is_not_taken_for_one_that_gets_there() -> None:
+    rig, led = Rig(PROFILES["ip4m-1041b"], 1), []
+    rig.calibrate()
+    goals = [goal for goal in random_goals(bounds.GOALS, 1) if min(goal[0], 360.0 - goal[0]) < 165.0]
+    for number, goal in enumerate(goals):
+        rig.log = partial(_lead_beside, rig, goal, led) if number > len(goals) / 2 else lambda reply: None
+        outcome = rig.go(goal)
+        assert outcome.rests
+        assert outcome.off <= bounds.OFF_DEG
+        rig.now += 1.0
+    assert len(led) > 5
+
+
+def _lead_beside(rig: Rig, goal: Goal, led: list[Goal], reply: Reply) -> None:
+    """Somebody sends it on to somewhere beside, as soon as it goes."""
+    if isinstance(reply.request, MoveTo) and goal not in led:
+        led.append(goal)
+        rig.client.send(replace(reply.request, pan=(goal[0] + 2.5) % 360.0))
 
 
 def _went(rig: Rig, goal: Goal) -> tuple[Outcome, float]:
