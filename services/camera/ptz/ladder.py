@@ -48,7 +48,7 @@ class Ladder:
         read = np.minimum(doubts, READ_ON_THE_WAY * self._rates)
         self._spreads = self._rates * skill.timing.spread + DOUBTED * LONG * skill.timing.usual * read + NOISE_DEG
         self._ends, self._goes_on = self._allowed(way.room, FEARED * LONG * skill.timing.usual * doubts)
-        self._options: list[list[Values]] = []  # by commands left, and speed: [end it, a speed below it, back; place]
+        self._options: list[Values] = []  # by commands left: [speed; end it, a speed, or back; place]
         self._best: list[Values] = []  # by commands left: [speed; place], less the time to come there
         for left in range(-MISSING, MOST + 1):
             self._reckon(left)
@@ -69,8 +69,8 @@ class Ladder:
     def next(self, distance: float, speed: int, left: int) -> int:
         """The speed that a command sets, where one acts at a distance; 0: it ends the motion; below 0: back."""
         place = int(np.clip(round((distance - self._at[0]) / STEP_DEG), 0, len(self._at) - 1))
-        option = int(self._options[_row(left)][speed - 1][:, place].argmin())
-        return option if option < speed else speed - 1 - option
+        option, speeds = int(self._options[_row(left)][speed - 1, :, place].argmin()), len(self._rates)
+        return option if option <= speeds else speeds - option
 
     def from_rest(self, distances: Values, left: int) -> Values:
         """How long it takes from rest at distances (positive) until it rests at the goal, commands at their price."""
@@ -88,18 +88,16 @@ class Ladder:
 
     def _reckon(self, left: int) -> None:
         """One command more is left."""
-        ended, options = self._ended(left), []
-        away = [self._away(other, left - 1) for other in range(TURNS)]
-        for speed in range(len(self._rates)):
-            follows = [self._followed(speed, other, left - 1) for other in range(speed)]
-            turns = [self._turned(speed, other, away[other], left - 1) for other in range(TURNS)]
-            values = self._mean(np.array([ended, *follows, *turns]), speed)
-            values[0][~self._ends[speed]] = NEVER_S
-            values[1 : 1 + speed][~self._goes_on[speed, :speed]] = NEVER_S
-            values[1 + speed :, ~self._ends[speed]] = NEVER_S
-            options.append(values)
-        best = np.array([values.min(axis=0) for values in options]) + _price(left)
-        self._options.append(options)
+        speeds, places = len(self._rates), len(self._at)
+        values = np.full((speeds, 1 + speeds + TURNS, places), NEVER_S)
+        values[:, 0] = self._ended(left)
+        values[:, 1 : 1 + speeds], values[:, 1 + speeds :] = self._followed(left - 1), self._turned(left - 1)
+        values = self._mean(values)
+        values[:, 0][~self._ends] = NEVER_S
+        values[:, 1 : 1 + speeds][~self._goes_on] = NEVER_S
+        values[:, 1 + speeds :][~np.broadcast_to(self._ends[:, None], (speeds, TURNS, places))] = NEVER_S
+        best = values.min(axis=1) + _price(left)
+        self._options.append(values)
         self._best.append(np.minimum.accumulate(best - self._at / self._rates[:, None], axis=1))
 
     def _ended(self, left: int) -> Values:
@@ -109,43 +107,55 @@ class Ladder:
         missed: Values = np.clip((off - self._near) / STEP_DEG + 0.5, 0.0, 1.0)
         return missed * (MISS * self._timing.usual + _price(left - 1) + again)
 
-    def _followed(self, speed: int, other: int, left: int) -> Values:
-        """Where another speed takes the place of one at a place."""
-        slows = float(self._slows[speed, other])
-        return slows + self._least(other, self._at, self._rates[other] * max(0.0, self._timing.usual - slows), left)
+    def _followed(self, left: int) -> Values:
+        """Where another speed takes the place of one at a place: [speed; other; place], of slower ones."""
+        usual, found = self._timing.usual, np.full((*self._slows.shape, len(self._at)), NEVER_S)
+        speeds, others = np.tril_indices(len(self._rates), -1)
+        slows = self._slows[speeds, others]
+        reaches = self._rates[others] * np.maximum(0.0, usual - slows)
+        found[speeds, others] = slows[:, None] + self._least(others, self._at, reaches, left)
+        return found
 
-    def _turned(self, speed: int, other: int, away: Values, left: int) -> Values:
-        """Where one turns back at a place; before the goal that leads `away`, and what then follows takes so long."""
-        stops = float(self._stops[speed])
-        reach = self._rates[other] * max(0.0, self._timing.usual - stops)
-        back = self.back._least(other, -self._at[: self._behind], reach, left)
-        return stops + np.concatenate([back, away])
-
-    def _away(self, other: int, left: int) -> Values:
-        """Where a speed leads away from the goal, at places before it: until it is turned round again."""
-        farther = self._at[self._behind :] + self._rates[other] * self._timing.usual
-        return self.from_rest(farther, left)  # its start is answered after as long
+    def _turned(self, left: int) -> Values:
+        """Where one turns back at a place: [speed; other; place]; before the goal that leads away from it."""
+        found = np.empty((len(self._rates), TURNS, len(self._at)))
+        speeds, others = np.indices(found.shape[:2]).reshape(2, -1)
+        reaches = self._rates[others] * np.maximum(0.0, self._timing.usual - self._stops[speeds])
+        back = self.back._least(others, -self._at[: self._behind], reaches, left)
+        found[:, :, : self._behind] = back.reshape(len(self._rates), TURNS, -1)
+        farther = self._at[self._behind :] + self._rates[:TURNS, None] * self._timing.usual
+        away = self.from_rest(farther.ravel(), left)  # its start is answered after as long
+        found[:, :, self._behind :] = away.reshape(farther.shape)
+        return self._stops[:, None, None] + found
 
     def _begun(self, distances: Values, left: int) -> Values:
         """Where each speed begins from rest: [speed; distance]."""
-        reaches = self._rates * self._timing.usual
-        return np.array([self._least(one, distances, reach, left) for one, reach in enumerate(reaches)])
+        return self._least(np.arange(len(self._rates)), distances, self._rates * self._timing.usual, left)
 
-    def _least(self, speed: int, distances: Values, reach: float, left: int) -> Values:
-        """With a speed from distances on, until the best place for the next command; it can act after `reach`."""
+    def _least(self, speeds: NDArray[np.intp], distances: Values, reaches: Values, left: int) -> Values:
+        """With speeds from distances on, until the best place for the next command: [speed; distance].
+
+        That can act after its `reach`.
+        """
         if left < -MISSING:
-            return np.full(len(distances), NEVER_S)
-        first = distances - reach
-        value = distances / self._rates[speed] + np.interp(first, self._at, self._best[_row(left)][speed])
+            return np.full((len(speeds), len(distances)), NEVER_S)
+        first = distances - reaches[:, None]
+        places = np.clip((first - self._at[0]) / STEP_DEG, 0.0, len(self._at) - 1.0)
+        value = distances / self._rates[speeds, None] + _between(self._best[_row(left)][speeds], places)
         return np.where(first < self._at[0], NEVER_S, value)
 
-    def _mean(self, values: Values, speed: int) -> Values:
-        """The mean over where a command may act that should act at a place."""
-        count = values.shape[1]
-        total = np.concatenate([np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1)
-        half, middle = max(0.5, self._spreads[speed] / STEP_DEG), np.arange(count) + 0.5
-        low, high = np.maximum(middle - half, 0.0), np.minimum(middle + half, float(count))
-        mean: Values = (_between(total, high) - _between(total, low)) / (high - low)
+    def _mean(self, values: Values) -> Values:
+        """The mean over where a command may act that should act at a place: [speed; option; place]."""
+        count, mean, middle = values.shape[-1], np.empty_like(values), np.arange(values.shape[-1]) + 0.5
+        halves = np.maximum(0.5, self._spreads / STEP_DEG)
+        edge = int(halves.max()) + 2
+        sums = np.zeros((*values.shape[:-1], edge + count + 1 + edge))
+        np.cumsum(values, axis=-1, out=sums[..., edge + 1 : edge + 1 + count])
+        sums[..., edge + 1 + count :] = sums[..., edge + count, None]
+        for speed, half in enumerate(halves):
+            width = np.minimum(middle + half, count) - np.maximum(middle - half, 0.0)
+            low, high = (_from(sums[speed], edge + 0.5 + to, count) for to in (-half, half))
+            mean[speed] = (high - low) / width
         return mean
 
 
@@ -160,7 +170,16 @@ def _price(left: int) -> float:
 
 def _between(rows: Values, index: Values) -> Values:
     """The values of rows between their points."""
-    whole = np.minimum(index.astype(int), rows.shape[1] - 2)
-    before: Values = rows[:, whole]
-    part: Values = index - whole
-    return before + part * (rows[:, whole + 1] - before)
+    whole = np.minimum(index.astype(int), rows.shape[-1] - 2)
+    before = np.take_along_axis(rows, whole, axis=-1)
+    after = np.take_along_axis(rows, whole + 1, axis=-1)
+    between: Values = before + (index - whole) * (after - before)
+    return between
+
+
+def _from(rows: Values, begin: float, count: int) -> Values:
+    """So many values of rows, one apart, the first between their points."""
+    whole = int(begin)
+    before = rows[:, whole : whole + count]
+    values: Values = before + (begin - whole) * (rows[:, whole + 1 : whole + 1 + count] - before)
+    return values
