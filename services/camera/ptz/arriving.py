@@ -14,7 +14,7 @@ from services.camera.ptz.course import FOREVER, PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import PAIR_S, Helm
-from services.camera.ptz.pace import HALF_CHANGE, READ_LATE
+from services.camera.ptz.pace import HALF_CHANGE, READ_LATE, Pace
 from services.camera.ptz.skill import NEARER_DEG, THERE_DEG
 from services.camera.requests import Reading, Reply, Status
 
@@ -159,8 +159,14 @@ class Arriving:
     @property
     def _rested(self) -> float:
         """When all rests, at the latest, that was seen slowing down on its last bit of way."""
-        skill = self.helm.skill
+        skill, left = self.helm.skill, READ_DEG + self.off
         newer = min(NEWEST_S, NEWER * skill.paces[PAN].other_doubt(READ_LATE))
-        half = max(pace.other(HALF_CHANGE) for axis in (PAN, TILT) for pace in (skill.drive(axis), skill.paces[axis]))
-        turns = min(self.when + newer, self.now) + LONGER * sqrt(4 * half * (READ_DEG + self.off))
+        slowest = max(_last(pace, left) for axis in (PAN, TILT) for pace in (skill.drive(axis), skill.paces[axis]))
+        turns = min(self.when + newer, self.now) + LONGER * slowest
         return max(zoom_drive.rests(skill, self.zooming), turns)
+
+
+def _last(pace: Pace, left: float) -> float:
+    """How long an axis takes to its rest that has so many degrees left, and does not get faster any more."""
+    half, top = pace.other(HALF_CHANGE), pace.rate(pace.speeds[-1])
+    return sqrt(4 * half * left) if left < half * top * top else left / top + half * top
