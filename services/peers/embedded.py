@@ -60,6 +60,9 @@ async def _serve(port: int) -> None:
     server._subscriptions = Table()
     await server.start()
     await stopping.wait()
+    for listener in server._servers.values():  # amqtt ends its clients first, and lets in again who returns at once
+        if listener.instance is not None:
+            listener.instance.close()
     await server.shutdown()
 
 
