@@ -14,6 +14,7 @@ from services.camera.ptz.course import FOREVER, PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import PAIR_S, Helm
+from services.camera.ptz.landing import RESTED_S
 from services.camera.ptz.pace import HALF_CHANGE, READ_LATE, Pace
 from services.camera.ptz.skill import NEARER_DEG, THERE_DEG
 from services.camera.requests import Reading, Reply, Status
@@ -140,7 +141,8 @@ class Arriving:
     def _goes_there(self) -> bool:
         """Whether what may still turn surely ends there."""
         skill, moving = self.helm.skill, self.seen[-1].moving
-        goes_on = self.hops and moving is True and not skill.always_moving
+        longer = self.hops or self.when > self.arrives + RESTED_S
+        goes_on = longer and moving is True and not skill.always_moving
         ends = skill.tells_rest(moving) or zoom_drive.sure(skill, self.zooming, self.now)
         return not self.about and not goes_on and ends
 

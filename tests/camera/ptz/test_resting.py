@@ -9,11 +9,16 @@ from typing import cast
 
 import pytest
 
+from services.camera.ptz.arriving import Arriving
+from services.camera.ptz.glide import Glide
+from services.camera.ptz.helm import Helm
 from services.camera.ptz.skill import Skill
+from services.camera.ptz.zoom_rate import ZoomRate
 from services.camera.requests import MoveTo, Reading, Reply, Request, Status
 from services.simulators.camera.firmwares import PROFILES
 from tests import bounds
 from tests.camera.goals import LIMITS, Goal, Outcome, Rig, random_goals
+from tests.camera.motors import Motors, drive
 
 NAMES = ("ip3m-941w-2019", "ip4m-1051b-2019", "ip3m-943b")  # the second says for ever that it moves; the last dithers
 
@@ -74,6 +79,19 @@ def test_where_the_firmware_ends_pan_and_zoom_itself_the_last_look_is_asked_for_
         rig.now += 1.0
     assert len(early) > bounds.GOALS / 2
     assert sum(early) >= 0.8 * len(early)
+
+
+def test_a_zoom_that_still_moves_where_it_should_rest_is_looked_at_until_it_does() -> None:
+    motors, skill = Motors(absolute="full", zoom=6.0, zoom_rate=1.0), Skill(zoom_rate=ZoomRate(4.0, 0.05))
+    helm, to = Helm(LIMITS.goal(90.0, 20.0, 8.0), LIMITS, skill), (90.0, 20.0, 8.0)
+    motors.answer(MoveTo(*to, "PositionABS"))
+    motors.pass_time(1.3)
+    end = Arriving(helm, to, Glide(998.7, 6.0, 0.0, 8.0, 4.0, 40.0, 998.7), certain=True)
+    run, _ = drive(end.at_rest(999.3, 999.3, 1000.0), motors, now=1000.0)
+    assert run.error is None
+    assert end.seen[0].zoom == 8.0
+    assert end.seen[0].moving
+    assert not motors.moving
 
 
 @pytest.mark.parametrize("name", ["ip4m-1041b", "2020s-dahua"])
