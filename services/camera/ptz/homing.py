@@ -17,11 +17,13 @@ from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.ladder import Ladder
 from services.camera.ptz.leg import Leg, Part
 from services.camera.ptz.outlook import Way
+from services.camera.ptz.pace import HALF_CHANGE
 from services.camera.requests import Reading, Refused
 
 ALONG = 1.0
 BACK_DEG = 10.0  # it goes no farther behind its goal
 LOOK = 1  # command, at the end
+RETURNS = 2.5  # of the time to slow down: tilt may return to where it was when it was ended
 MOST_STEPS = 20  # hardly ever more than eight; then it is ended where it is
 
 Watch = Callable[[Leg, dict[int, int], float], Plan[float]]
@@ -86,9 +88,10 @@ class Homing:
         request = own.to_pan((pan, tilt, zoom), helm.aim)
         begun = yield from helm.send(request)
         acted, course = begun.received, helm.course
-        tilt, ended = course.stopped(TILT, acted), acted + helm.skill.paces[TILT].change(abs(course.levels[TILT]))
-        here = (course.at(PAN, acted), tilt, zoom)
-        speeds = (helm.skill.paces[PAN].velocity(course.told[PAN], acted), 0.0, 0.0)
+        turns, tilts = (helm.skill.paces[axis].velocity(course.told[axis], acted) for axis in (PAN, TILT))
+        ended = acted + RETURNS * 2 * helm.skill.paces[TILT].other(HALF_CHANGE) * abs(tilts)
+        tilt = course.stopped(TILT, acted)
+        here, speeds = (course.at(PAN, acted), tilt, zoom), (turns, 0.0, 0.0)
         course.leave(here)
         helm.zoom_ends = None
         to = (helm.aim[PAN], tilt, helm.goal.pose[ZOOM])
