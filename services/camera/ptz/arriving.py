@@ -22,7 +22,8 @@ from services.camera.requests import Reading, Reply, Status
 FEW = 3  # commands left
 LOOKS = 30  # less and less often
 LONG_S = 2.0  # apart, at most
-MOST_DEG = 3.0  # of the way left: more tells nothing of its end
+MOSTLY = 0.7  # of the spread of answers: one look in six is answered sooner, and tells of a moment before
+MOST_DEG = 5.0  # of the way left: more tells nothing of its end
 NEWER, NEWEST_S = 2.0, 0.1  # standard deviations that a reading may be newer than is known, and at most
 READ_DEG, LONGER = 0.1, 1.3  # of a reading; than is reckoned an axis may take to slow down
 
@@ -58,7 +59,8 @@ class Arriving:
         """
         skill, self.arrives = self.helm.skill, arrives
         late = max(skill.arrives_late, skill.timing.spread if self.helm.left <= FEW else 0.0)  # none of those too soon
-        yield from wait(max(now, nears - skill.read_late + late))
+        ended = self.ended + MOSTLY * skill.timing.spread if self.ended else 0.0
+        yield from wait(max(now, max(ended, nears + late) - skill.read_late))
         for _ in range(LOOKS):
             reply = yield from self._look()
             if self._there or self._beside or self._still(reply.sent):

@@ -14,10 +14,11 @@ from services.camera.ptz import drive as own
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.driving import follow
 from services.camera.ptz.helm import Helm, levels_of, sign
-from services.camera.ptz.ladder import Ladder
+from services.camera.ptz.ladder import AGAIN, Ladder
 from services.camera.ptz.leg import Leg, Part
 from services.camera.ptz.outlook import Way
 from services.camera.ptz.pace import HALF_CHANGE
+from services.camera.ptz.skill import LATE_PART
 from services.camera.requests import Reading, Refused
 
 ALONG = 1.0
@@ -115,13 +116,18 @@ class Homing:
         return Leg({TILT: Part(speed, max(usual, (distance - before) / rate), -before)})
 
     def _along(self, held: float, now: float) -> int:
-        """The level of pan meanwhile: so fast that it stays before its goal, and before the stop behind it if late."""
+        """The level of pan meanwhile: so fast that it stays before its goal, and before the stop behind it if late.
+
+        It goes on as it does until that is answered, which may be late, and the next answer too.
+        """
         if not self.helm.skill.diagonals:
             return 0
         way, timing = self._way(PAN, now), self.helm.skill.timing
+        far, level = abs(way.distance), self.helm.course.levels[PAN] * sign(way.distance)
+        before = LATE_PART * timing.tail * way.pace.rate(level) if level > 0 else 0.0
         for speed in reversed(way.pace.speeds):
             rate = way.pace.rate(speed) + 2 * way.pace.doubt(speed)
-            far = abs(way.distance)
-            if rate * (held + timing.usual) <= ALONG * far and rate * (held + timing.tail) <= far + way.room:
+            late = max(rate * (held + timing.tail), before + rate * (timing.usual + AGAIN * timing.tail))
+            if rate * (held + timing.usual) <= ALONG * far and late <= far + way.room:
                 return speed * sign(way.distance)
         return 0
