@@ -15,7 +15,7 @@ from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import PAIR_S, Helm
 from services.camera.ptz.landing import RESTED_S
-from services.camera.ptz.pace import HALF_CHANGE, READ_LATE, Pace
+from services.camera.ptz.pace import READ_LATE, Pace
 from services.camera.ptz.skill import NEARER_DEG, THERE_DEG
 from services.camera.requests import Reading, Reply, Status
 
@@ -172,5 +172,5 @@ class Arriving:
 
 def _last(pace: Pace, left: float) -> float:
     """How long an axis takes to its rest that has so many degrees left, and does not get faster any more."""
-    half, top = pace.other(HALF_CHANGE), pace.rate(pace.speeds[-1])
-    return sqrt(4 * half * left) if left < half * top * top else left / top + half * top
+    top = pace.rate(pace.speeds[-1])
+    return sqrt(2 * pace.slow * left) if left < pace.braking(top) else left / top + pace.slow * top / 2

@@ -18,7 +18,7 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Goal, Limits
 from services.camera.ptz.helm import Helm, levels_of
 from services.camera.ptz.move import Arrival, goto
-from services.camera.ptz.pace import HALF_CHANGE, READ_LATE
+from services.camera.ptz.pace import READ_LATE
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.zoom_sweeps import sweep
@@ -139,8 +139,8 @@ def habits(skill: Skill) -> dict[str, str]:
         "an answer takes": f"{timing.usual:.2f} s, most within {timing.spread:.2f} s of that",
         "it may be late by": f"{timing.tail:.2f} s",
         "a reading tells of": f"{-pan.other(READ_LATE):+.2f} s before it is asked for",
-        "acceleration of pan": f"{1 / (2 * pan.other(HALF_CHANGE)):.0f} degrees/s^2",
-        "acceleration of tilt": f"{1 / (2 * tilt.other(HALF_CHANGE)):.0f} degrees/s^2",
+        "acceleration of pan": f"{1 / pan.slow:.0f} degrees/s^2",
+        "acceleration of tilt": f"{1 / tilt.slow:.0f} degrees/s^2",
         "smallest step of pan": f"{pan.rate(1) * timing.usual:.2f} degrees",
         "right is": "growing pan" if skill.senses[PAN].sign > 0 else "falling pan",
         "down is": "growing tilt" if skill.senses[TILT].sign > 0 else "falling tilt",

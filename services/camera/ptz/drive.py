@@ -15,7 +15,7 @@ from services.camera.ptz import zoom_drive
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
-from services.camera.ptz.pace import HALF_CHANGE, Seen, Told
+from services.camera.ptz.pace import Seen, Told
 from services.camera.ptz.skill import Skill
 from services.camera.requests import GotoPreset, MoveTo, Reply
 
@@ -71,7 +71,7 @@ class Begun:
         for axis in (PAN, TILT):
             pace, way = skill.drive(axis), self.drive.to[axis] - self.here[axis]
             travel = (seen[axis] - self.here[axis]) * (1 if way > 0 else -1)
-            braking = pace.other(HALF_CHANGE) * pace.rate(1) ** 2
+            braking = pace.braking(pace.rate(1))
             if LEAST_DEG < travel < abs(way) - 1.5 * braking - 3.0:
                 told = [Told(self.reply.received, timing.late(self.reply), 1)]
                 pace.learn(told, Seen(reply.sent, timing.late(reply), travel, NOISE_DEG + NOISE_S * pace.rate(1)))

@@ -17,7 +17,6 @@ from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.ladder import AGAIN, Ladder
 from services.camera.ptz.leg import Leg, Part
 from services.camera.ptz.outlook import Way
-from services.camera.ptz.pace import HALF_CHANGE
 from services.camera.ptz.skill import LATE_PART
 from services.camera.requests import Reading, Refused
 
@@ -90,7 +89,7 @@ class Homing:
         begun = yield from helm.send(request)
         acted, course = begun.received, helm.course
         turns, tilts = (helm.skill.paces[axis].velocity(course.told[axis], acted) for axis in (PAN, TILT))
-        ended = acted + RETURNS * 2 * helm.skill.paces[TILT].other(HALF_CHANGE) * abs(tilts)
+        ended = acted + RETURNS * helm.skill.paces[TILT].slow * abs(tilts)
         tilt = course.stopped(TILT, acted)
         here, speeds = (course.at(PAN, acted), tilt, zoom), (turns, 0.0, 0.0)
         course.leave(here)

@@ -21,7 +21,7 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import RESTS_S, Helm
-from services.camera.ptz.pace import ACT_PART, HALF_CHANGE
+from services.camera.ptz.pace import ACT_PART
 from services.camera.ptz.planes import Planes, Scale
 from services.camera.ptz.rush import rush
 from services.camera.ptz.scale import Hop, Turned
@@ -224,9 +224,9 @@ class Hopping:
         for axis, (way, (place, speed)) in enumerate(zip((right, down, request.zoom), poses, strict=True)):
             low, high = helm.limits.ranges[axis]
             pace = helm.skill.drive(ZOOM) if axis == ZOOM else helm.skill.paces[axis]
-            top, slow = pace.rate(pace.speeds[-1]), 2 * pace.other(HALF_CHANGE)
+            top = pace.rate(pace.speeds[-1])
             goal = min(high, max(low, place + way))
-            self.glides.append(Glide(acted, place, speed, goal, top, 1 / slow, reply.received))
+            self.glides.append(Glide(acted, place, speed, goal, top, 1 / pace.slow, reply.received))
         begun, speeds = ((pan, tilt, zoom) for pan, tilt, zoom in zip(*poses, strict=True))
         tops = (self.glides[PAN].top, self.glides[TILT].top, self.glides[ZOOM].top)
         zoomed = copysign(acted - self.zooming.began, speeds[ZOOM]) if speeds[ZOOM] else 0.0

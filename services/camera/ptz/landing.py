@@ -123,9 +123,8 @@ def _start(skill: Skill, hops: Sequence[Hop], axis: int, change: float, moment: 
 def _lasts(skill: Skill, hop: Hop, axis: int, change: float) -> float:
     """How much longer a hop may take, or less: by its acceleration, and by its top speed as long as it has that."""
     pace, way, top = skill.paces[axis], abs(hop.ways[axis]), hop.tops[axis]
-    slows = 2 * pace.other(HALF_CHANGE)  # seconds for a change by one degree/s
-    fast = max(0.0, way / top - top * slows)
-    return hypot(change * min(top * slows, sqrt(way * slows)), fast * pace.doubt(pace.speeds[-1]) / top)
+    fast = max(0.0, way / top - top * pace.slow)
+    return hypot(change * min(top * pace.slow, sqrt(way * pace.slow)), fast * pace.doubt(pace.speeds[-1]) / top)
 
 
 def stray(scale: Scale, glides: Sequence[Glide], known: Sequence[Doubts], told: Sequence[End]) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import exp, inf, log, sqrt
 
-from services.camera.ptz.pace import HALF_CHANGE, STOP_LATE, Pace
+from services.camera.ptz.pace import STOP_LATE, Pace
 from services.camera.ptz.skill import DITHER_DEG, Skill
 
 NOISE_DEG = 0.05  # of a reading, beside what is learnt
@@ -127,7 +127,7 @@ def feared(way: Way, speed: int, distance: float, skill: Skill) -> float:
 
 def held_for(pace: Pace, speed: int, distance: float) -> float:
     """How long from the effect of a start to that of its end for a distance (positive)."""
-    rate, slow = pace.rate(speed), 2 * pace.other(HALF_CHANGE)
+    rate, slow = pace.rate(speed), pace.slow
     if distance >= slow * rate * rate:
         return distance / rate - pace.other(STOP_LATE)
     return sqrt(max(0.0, distance) * slow) - pace.other(STOP_LATE)  # it never gets to its speed

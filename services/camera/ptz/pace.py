@@ -110,9 +110,18 @@ class Pace:
         number = len(self.guess) + which
         return float(np.sqrt(self.cov[number, number]))
 
+    @property
+    def slow(self) -> float:
+        """Seconds for a change by one degree/s: one over its acceleration."""
+        return 2 * self.other(HALF_CHANGE)
+
+    def braking(self, rate: float) -> float:
+        """How far it goes while it slows down from a rate to rest."""
+        return self.other(HALF_CHANGE) * rate**2
+
     def change(self, speed: int, to: int = 0) -> float:
         """How long a change of speed takes, seconds."""
-        return 2 * self.other(HALF_CHANGE) * abs((self.rate(speed) if speed else 0) - (self.rate(to) if to else 0))
+        return self.slow * abs((self.rate(speed) if speed else 0) - (self.rate(to) if to else 0))
 
     def travel(self, told: Sequence[Told], at: float) -> float:
         """How far it has come at a time, from rest before the first command."""

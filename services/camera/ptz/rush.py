@@ -10,7 +10,7 @@ from typing import cast
 from services.camera.plan import Plan, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.helm import Helm, levels_of, sign
-from services.camera.ptz.pace import HALF_CHANGE, Pace
+from services.camera.ptz.pace import Pace
 from services.camera.requests import Reading, Status
 
 FEARED = 1.0  # of the doubt about a rate, where a stop is near
@@ -69,7 +69,7 @@ def _whole(pace: Pace, way: float) -> float:
 
 def _brakes(pace: Pace) -> float:
     """How far it goes while it brakes from its top speed."""
-    return _top(pace) ** 2 * pace.other(HALF_CHANGE)
+    return pace.braking(_top(pace))
 
 
 def _before(pace: Pace, reach: float, spread: float) -> float:
