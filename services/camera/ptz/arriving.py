@@ -23,6 +23,7 @@ FEW = 3  # commands left
 LOOKS = 30  # less and less often
 LONG_S = 2.0  # apart, at most
 MOSTLY = 0.7  # of the spread of answers: one look in six is answered sooner, and tells of a moment before
+MOMENT_S = 0.02  # later or sooner a reading on the way may be than is reckoned: networks hold answers up
 MOST_DEG = 5.0  # of the way left: more tells nothing of its end
 NEWER, NEWEST_S = 2.0, 0.1  # standard deviations that a reading may be newer than is known, and at most
 READ_DEG, LONGER = 0.1, 1.3  # of a reading; than is reckoned an axis may take to slow down
@@ -91,7 +92,11 @@ class Arriving:
         Whether it moves there nobody has told.
         """
         seen = self.seen[-1]
-        if self.when >= self.arrives or self._rests or not self._there or self.off <= THERE_DEG:
+        if self.when >= self.arrives or self._rests or not self._there:
+            return seen
+        if not self._zoomed(seen):
+            seen = zoom_drive.at_end(self.helm.skill, self.zooming, seen)
+        if self.off <= THERE_DEG:
             return seen
         tilt = seen.tilt if self.ended else round(self.to[TILT], 2)
         return replace(seen, pan=round(self.to[PAN] % 360.0, 2), tilt=tilt, moving=None)
@@ -120,8 +125,13 @@ class Arriving:
         return abs(reading.zoom - self.to[ZOOM]) <= self.helm.zoom_near
 
     @property
+    def _zooms(self) -> bool:
+        """Whether zoom still turns, and will be where it should."""
+        return bool(self.turning) and zoom_drive.comes(self.helm.skill, self.zooming, self.seen[-1], self.when)
+
+    @property
     def _there(self) -> bool:
-        near = self.certain and self.when > self.ended and self._near and self._zoomed(self.seen[-1])
+        near = self.certain and self.when > self.ended and self._near and (self._zoomed(self.seen[-1]) or self._zooms)
         return near and (self._rests or self._goes_there)
 
     @property
@@ -134,10 +144,13 @@ class Arriving:
         """Whether pan and tilt still turn, and are where they should be then."""
         if self.when >= self.arrives or self.off > MOST_DEG or self.helm.skill.tells_rest(self.seen[-1].moving):
             return False
-        pose = self.helm.limits.pose(self.seen[-1])
-        return bool(self.turning) and all(
-            abs(pose[axis] - self.turning[axis].at(self.when)[0]) <= NEARER_DEG for axis in self._axes
-        )
+        return bool(self.turning) and all(map(self._as_reckoned, self._axes))
+
+    def _as_reckoned(self, axis: int) -> bool:
+        """Whether the latest reading shows an axis where it should be on its way."""
+        place, speed = self.turning[axis].at(self.when)
+        off = self.helm.limits.pose(self.seen[-1])[axis] - place
+        return abs(off) <= NEARER_DEG + MOMENT_S * abs(speed)
 
     @property
     def _goes_there(self) -> bool:

@@ -60,9 +60,9 @@ class Begun:
         return max(self.ended, *(glide.ends for glide in self.ways(skill)))
 
     def nears(self, skill: Skill, left: float) -> float:
-        """When no more than so many degrees of pan and tilt should be left, and of zoom what its reading hides."""
+        """When no more than so many degrees of pan and tilt should be left, and of zoom what a look may leave open."""
         pan, tilt, zoom = self.ways(skill)
-        zoomed = zoom.within(zoom_drive.unread(skill) if left else 0.0)
+        zoomed = zoom.within(zoom_drive.unread(skill, zoom) if left else 0.0)
         return max(self.ended, pan.within(left), tilt.within(left), zoomed)
 
     def look(self, skill: Skill, reply: Reply, seen: Pose) -> None:

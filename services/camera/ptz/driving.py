@@ -16,7 +16,7 @@ from services.camera.requests import Reading, Refused, Request, Status
 MOST_DRIVES = 4  # in one move
 TRY_LEFT = 7  # commands; with fewer nothing new is tried
 EXACT = 3  # of its moves in a row ended where they should: then it is known where the next one ends,
-LEFT_DEG = 0.75  # and a look is enough while so much of it should be left
+LEFT_DEG = 2.0  # and a look is enough while so much of it should be left
 LONG_S = 2.0  # a drive that takes longer is looked at on the way, which costs no time
 
 

@@ -143,7 +143,7 @@ def _time(skill: Skill, late: float, share: float) -> float:
 def sight(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts]) -> float | None:
     """When to ask for a look that tells where pan and tilt will rest, the earliest; None: no look would."""
     turning = glides[:ZOOM]
-    zoomed = glides[ZOOM].within(zoom_drive.unread(skill))
+    zoomed = glides[ZOOM].within(zoom_drive.unread(skill, glides[ZOOM]))
     for left in LEFT_DEG:
         when = max(zoomed, *(glide.within(left) for glide in turning))
         told = [foretell(glide, when, glide.at(when)[0], known[axis]) for axis, glide in enumerate(turning)]

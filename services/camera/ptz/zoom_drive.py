@@ -5,6 +5,7 @@ It is read in coarse steps: a reading tells of it at the edge of a step only, an
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import hypot, inf
 from typing import cast
 
@@ -17,12 +18,36 @@ from services.camera.requests import Reading, Reply
 SLOWER = 0.01  # it may last longer than that, for all that is known
 SURE = 0.4  # of its rate may be in doubt
 UNREAD_LEVELS = 0.6  # where it is told in coarse steps
+AHEAD_LEVELS, KNOWN = 1.4, 0.03  # where it is known how fast it is: so that no more of its rate is in doubt
+EDGE_LEVELS = 0.15  # of where a step of its reading begins, on the way
 NOISE_LEVELS = 0.5  # of where it was on its way, at the edge of a step of its reading
 
 
-def unread(skill: Skill) -> float:
-    """So much of its way, at most, may be left where it is read to be there, levels."""
-    return UNREAD_LEVELS if skill.zoom_grid else 0.0
+def unread(skill: Skill, glide: Glide) -> float:
+    """So much of its way, at most, may be left where a look tells that it gets there, levels."""
+    if not skill.zoom_grid:
+        return 0.0
+    left = min(AHEAD_LEVELS, abs(glide.goal - glide.place) - skill.zoom_grid / 2 - 2 * EDGE_LEVELS)
+    return max(UNREAD_LEVELS, left if _known(skill) else 0.0)
+
+
+def comes(skill: Skill, glide: Glide, reading: Reading, when: float) -> bool:
+    """Whether a look at a time shows it on its last bit of way, where it is reckoned; it has left where it began."""
+    place, _ = glide.at(when)
+    step = skill.zoom_grid / 2 + EDGE_LEVELS
+    turns = when < glide.ends and not skill.tells_rest(reading.moving)
+    last = abs(glide.goal - place) <= skill.zoom_grid
+    shown = abs(reading.zoom - place) <= step <= abs(reading.zoom - glide.place)
+    return turns and last and shown and _known(skill)
+
+
+def at_end(skill: Skill, glide: Glide, reading: Reading) -> Reading:
+    """The reading as it will be when zoom rests; whether anything moves then nobody has told."""
+    return replace(reading, zoom=round(glide.goal / skill.zoom_step) * skill.zoom_step, moving=None)
+
+
+def _known(skill: Skill) -> bool:
+    return skill.zoom_rate.known()[1] <= KNOWN
 
 
 def see(skill: Skill, glide: Glide, reply: Reply) -> None:

@@ -20,7 +20,8 @@ OFTEN_S = 0.1  # that takes so long
 KEPT = 0.99  # of what looks told, with each one more
 NOISE_LEVELS, NOISE_S = 0.03, 0.006  # of where a step begins; of the moment that a look tells of
 ODD = 0.01  # of the looks tell nothing
-EXACT = 0.003  # of the rate stays in doubt
+EXACT = 0.003  # of the rate stays in doubt,
+LONGER = 1 + 2 * EXACT  # so that it may be slower than all that is reckoned with
 
 Grid = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ class ZoomRate:
 
     def lasts(self, way: float, part: float) -> float:
         """How long a way takes from rest to rest, levels and seconds; longer in so small a part of all that fits."""
-        seconds = (way / RATES + SLOWS_S).ravel()
+        seconds = (LONGER * way / RATES + SLOWS_S).ravel()
         longest = np.argsort(-seconds)
         likely = np.cumsum(self._likely.ravel()[longest])
         return float(seconds[longest[np.searchsorted(likely, part * likely[-1])]])

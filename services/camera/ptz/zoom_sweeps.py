@@ -50,6 +50,8 @@ def _request(limits: Limits, skill: Skill, here: Pose, to: float) -> Request:
     way = drive.find(here, (here[PAN], here[TILT], to), limits, skill, {})
     if way is not None and drive.honoured(skill, way):
         return way.request
+    if drive.pan_only(skill):
+        return drive.to_pan(here, (here[PAN], here[TILT], to))
     for form in skill.scales:
         if skill.honours.get(form) == skill.honours.get(zooms(form)) == "yes":
             return MoveOver(0.0, 0.0, SPARE * (to - here[ZOOM]), form)

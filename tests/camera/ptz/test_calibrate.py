@@ -68,3 +68,17 @@ def test_how_fast_zoom_is_is_known_afterwards_although_it_is_told_in_coarse_step
     assert skill.paces[2].doubt(1) < 0.1 * rate
     assert motors.pushed == 0.0
     assert not motors.moving
+
+
+def test_and_how_fast_a_position_drives_it_where_tilt_is_ignored() -> None:
+    motors, skill, limits = (
+        Motors(absolute="pan-only", zoom_rate=3.0, zoom_grid=2.0, acceleration=120.0),
+        Skill(),
+        Limits(),
+    )
+    run, _ = drive(calibrate(limits, skill), motors, limit_s=300.0)
+    assert run.error is None
+    assert skill.honours["PositionABS"] == "pan"
+    rate, doubt = skill.zoom_rate.known()
+    assert rate == pytest.approx(3.0, rel=0.03)
+    assert doubt < 0.02

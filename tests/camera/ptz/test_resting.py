@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from itertools import islice
+from statistics import mean
 from typing import cast
 
 import pytest
@@ -79,6 +80,43 @@ def test_where_the_firmware_ends_pan_and_zoom_itself_the_last_look_is_asked_for_
         rig.now += 1.0
     assert len(early) > bounds.GOALS / 2
     assert sum(early) >= 0.8 * len(early)
+
+
+@pytest.mark.parametrize("name", ["dahua-pan-only", "ip4m-1041b"])
+def test_zoom_that_is_seen_on_its_way_as_reckoned_is_not_waited_for_to_be_looked_at(name: str) -> None:
+    rig, ahead, last = Rig(PROFILES[name], 1), 0, 0
+    rig.calibrate()
+    for goal in random_goals(bounds.GOALS, 1):
+        sent: list[Reply] = []
+        rig.log = sent.append
+        outcome = rig.go(goal)
+        assert outcome.rests
+        assert outcome.off_zoom < 1.0
+        assert rig.near is not None
+        assert rig.near.zoom == round(rig.truth()[2] / 2) * 2
+        look, moves = sent[-1].sent, sent[-2].received
+        (_, _, zoom), turns = rig.device.motion(look)
+        if turns[2] and abs(goal[2] - rig.device.motion(moves)[0][2]) > 3.0:
+            last += 1
+            ahead += abs(goal[2] - zoom) > 0.8
+        rig.now += 1.0
+    assert last > 4
+    assert ahead >= 0.5 * last
+
+
+def test_answers_that_a_network_holds_up_hardly_delay_the_end() -> None:
+    def after_rest(network_s: float) -> float:
+        rig, found = Rig(PROFILES["ip4m-1041b"], 1, network_s=network_s), []
+        rig.calibrate()
+        for goal in random_goals(bounds.GOALS, 1):
+            outcome = rig.go(goal)
+            assert outcome.rests
+            assert outcome.off <= bounds.OFF_DEG
+            found.append(rig.now - rig.device.ptz.motors.rests_at)
+            rig.now += 1.0
+        return mean(found)
+
+    assert after_rest(0.01) < after_rest(0.0) + 0.05
 
 
 def test_a_zoom_that_still_moves_where_it_should_rest_is_looked_at_until_it_does() -> None:

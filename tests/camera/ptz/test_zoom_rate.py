@@ -94,3 +94,12 @@ def test_a_way_hardly_ever_lasts_longer_than_it_says() -> None:
             longer.append(RANGE / rate + slows > known.lasts(RANGE, 0.02))
     assert sum(longer) <= 0.05 * len(longer)
     assert known.lasts(RANGE, 0.02) < 1.1 * (RANGE / rate + slows)  # and it does not say any time
+
+
+def test_nor_after_so_many_looks_that_all_but_one_rate_is_ruled_out() -> None:
+    for seed in range(40):
+        rng = random.Random(seed)
+        known, rate = ZoomRate(4.0, 0.5), rng.uniform(1.5, 6.0)
+        for _ in range(15):
+            sweep(known, rng, rate, 0.1, 2.0)
+        assert RANGE / rate + 0.1 <= known.lasts(RANGE, 0.01) < 1.05 * (RANGE / rate + 0.1)
