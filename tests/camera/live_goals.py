@@ -3,8 +3,8 @@
 What a user would measure with a watch: from the order to `done`, with the service's own looks at the camera between its
 requests, and a picture that is watched meanwhile; from a cold start, and after `apartment calibrate ptz`. Without the
 service, in virtual time: `goals.py`. Two firmwares are measured at once, for most of the time they wait for motors;
-with four, two cores are so busy with pictures that answers come hundredths of a second late, each another one. A
-camera that turns 27 degrees a second is elsewhere then, and nothing but one more look tells.
+with four, two cores are so busy with pictures that answers come a hundredth of a second later. A camera that turns 27
+degrees a second is elsewhere then, and nothing but one more look tells.
 """
 
 from __future__ import annotations
