@@ -78,7 +78,7 @@ class Arriving:
         reply = yield from self.helm.send(Status())
         self.seen.append(cast(Reading, reply.result))
         self.now = reply.received
-        self.when = self.helm.skill.paces[PAN].seen_at(reply.sent, self.helm.skill.timing.late(reply))
+        self.when = self.helm.skill.seen_at(reply)
         again = len(self.seen) > 1 and same(self.seen[-2], self.seen[-1])
         self.since = self.since if again else reply.sent
         self.helm.skill.says_late |= again and self.seen[-2].moving is True
@@ -94,7 +94,7 @@ class Arriving:
         seen = self.seen[-1]
         if self.when >= self.arrives or self._rests or not self._there:
             return seen
-        if not self._zoomed(seen):
+        if not self._zoomed:
             seen = zoom_drive.at_end(self.helm.skill, self.zooming, seen)
         if self.off <= THERE_DEG:
             return seen
@@ -121,8 +121,10 @@ class Arriving:
         """Whether the camera tells by itself that this is its last position."""
         return self.helm.skill.tells_end(self.seen[-1].moving)
 
-    def _zoomed(self, reading: Reading) -> bool:
-        return abs(reading.zoom - self.to[ZOOM]) <= self.helm.zoom_near
+    @property
+    def _zoomed(self) -> bool:
+        """Whether zoom is read where it should be."""
+        return abs(self.seen[-1].zoom - self.to[ZOOM]) <= self.helm.zoom_near
 
     @property
     def _zooms(self) -> bool:
@@ -131,7 +133,7 @@ class Arriving:
 
     @property
     def _there(self) -> bool:
-        near = self.certain and self.when > self.ended and self._near and (self._zoomed(self.seen[-1]) or self._zooms)
+        near = self.certain and self.when > self.ended and self._near and (self._zoomed or self._zooms)
         return near and (self._rests or self._goes_there)
 
     @property

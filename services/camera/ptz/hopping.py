@@ -131,8 +131,7 @@ class Hopping:
             arrives = max(self._ends(), self.glides[ZOOM].ends)
             ends = landing.ends(helm.skill, self.glides, doubts, reply, helm.limits.pose(reading))
             landing.stray(self._scale, self.glides, doubts, ends)
-            seen_at = helm.skill.paces[PAN].seen_at(reply.sent, helm.skill.timing.late(reply))
-            if zoom_drive.comes(helm.skill, self.zooming, reading, seen_at):
+            if zoom_drive.comes(helm.skill, self.zooming, reading, helm.skill.seen_at(reply)):
                 reading = zoom_drive.at_end(helm.skill, self.zooming, reading)
             zoomed = abs(helm.goal.pose[ZOOM] - reading.zoom) <= helm.zoom_near or not self._takes_zoom()
             sure = zoomed and zoom_drive.sure(helm.skill, self.zooming, now)

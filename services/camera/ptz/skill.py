@@ -134,6 +134,10 @@ class Skill:
         for pace in (*self.paces, *self.drives):
             pace.measure_late_from(self.timing.usual - before)
 
+    def seen_at(self, reply: Reply) -> float:
+        """The time of which the reading tells that an answer brought."""
+        return self.paces[0].seen_at(reply.sent, self.timing.late(reply))
+
     def forget_senses(self, *, flip: bool, mirror: bool) -> None:
         """The picture's options changed, and these swap the motors: guess, and look at the next motion."""
         self.picture = (flip, mirror)

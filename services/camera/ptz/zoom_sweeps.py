@@ -70,7 +70,7 @@ def _once(limits: Limits, skill: Skill, known: ZoomRate, end: float) -> Plan[tup
         reply = yield from _send(skill, Status())
         now, reading = reply.received, cast(Reading, reply.result)
         skill.see_zoom(reading.zoom, limits.zoom)
-        seen = skill.paces[PAN].seen_at(reply.sent, skill.timing.late(reply)) - begun.received
+        seen = skill.seen_at(reply) - begun.received
         if here in limits.zoom and seen > 0:
             came = abs(reading.zoom - here)
             known.see(seen, came - step / 2 if came else -inf, came + step / 2 if came < way else inf)
