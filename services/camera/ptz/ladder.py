@@ -38,125 +38,173 @@ class Ladder:
 
     def __init__(self, way: Way, skill: Skill, back: Ladder | None = None) -> None:
         self.back, self._near, self._timing = back or self, way.near, skill.timing
-        self._rates = np.array([way.pace.rate(speed) for speed in way.pace.speeds])
+        self.rates = np.array([way.pace.rate(speed) for speed in way.pace.speeds])
         self._slows = np.array([[way.pace.change(one, to) for to in way.pace.speeds] for one in way.pace.speeds])
         self._stops = np.array([way.pace.change(speed) for speed in way.pace.speeds])
-        farthest = self._rates[-1] * (FEAR * skill.timing.tail + skill.timing.usual) + FARTHER_DEG
-        self._at = np.arange(-BEYOND_DEG, min(farthest, abs(way.distance) + BEYOND_DEG / 2), STEP_DEG)
-        self._behind = int(np.count_nonzero(self._at < 0))  # places
+        farthest = self.rates[-1] * (FEAR * skill.timing.tail + skill.timing.usual) + FARTHER_DEG
+        self.at = np.arange(-BEYOND_DEG, min(farthest, abs(way.distance) + BEYOND_DEG / 2), STEP_DEG)
+        self._behind = int(np.count_nonzero(self.at < 0))  # places
         doubts = np.array([way.pace.doubt(speed) for speed in way.pace.speeds])
-        read = np.minimum(doubts, READ_ON_THE_WAY * self._rates)
-        self._spreads = self._rates * skill.timing.spread + DOUBTED * LONG * skill.timing.usual * read + NOISE_DEG
-        self._ends, self._goes_on = self._allowed(way.room, FEARED * LONG * skill.timing.usual * doubts)
-        self._options: list[Values] = []  # by commands left: [speed; end it, a speed, or back; place]
-        self._best: list[Values] = []  # by commands left: [speed; place], less the time to come there
+        read = np.minimum(doubts, READ_ON_THE_WAY * self.rates)
+        spreads = self.rates * skill.timing.spread + DOUBTED * LONG * skill.timing.usual * read + NOISE_DEG
+        self._first = np.cumsum([0, *(1 + TURNS + slower for slower in range(len(self.rates)))])  # option of a speed
+        self._allowed = self._allow(way.room, FEARED * LONG * skill.timing.usual * doubts)
+        self._about = _About(spreads / STEP_DEG, np.diff(self._first), len(self.at))
+        self._follows, self._turns, self._begins = self._ahead()
+        self._options: list[Values] = []  # by commands left: [of each speed end it, back, or a slower one; place]
+        self.best: list[Values] = []  # by commands left: [speed; place], less the time to come there
+        self._rests: dict[int, Values] = {}  # by commands left: from rest, at `_far`
         for left in range(-MISSING, MOST + 1):
             self._reckon(left)
 
     def begins(self, distance: float, left: int) -> int:
         """The speed from rest; `left` commands for it and all that follow, but for the look at the end."""
-        return 1 + int(np.argmin(self._begun(np.array([distance]), left - 1)))
+        ahead = self._from_rest_at(np.array([distance]))
+        return 1 + int(np.argmin(ahead.least(left - 1)))
 
     def covers(self, distance: float) -> bool:
         """Whether it is reckoned what to do at a distance."""
-        return bool(self._at[0] <= distance <= self._at[-1])
+        return bool(self.at[0] <= distance <= self.at[-1])
 
     def acts_at(self, distance: float, speed: int, left: int) -> float:
         """The distance at which the next command should act, where none acts before the given one."""
-        value = np.min(self._options[_row(left)][speed - 1], axis=0) - self._at / self._rates[speed - 1]
-        return float(self._at[np.where(self._at <= max(self._at[0], distance), value, NEVER_S * 2).argmin()])
+        value = self._of(speed, left).min(axis=0) - self.at / self.rates[speed - 1]
+        return float(self.at[np.where(self.at <= max(self.at[0], distance), value, NEVER_S * 2).argmin()])
 
     def next(self, distance: float, speed: int, left: int) -> int:
         """The speed that a command sets, where one acts at a distance; 0: it ends the motion; below 0: back."""
-        place = int(np.clip(round((distance - self._at[0]) / STEP_DEG), 0, len(self._at) - 1))
-        option, speeds = int(self._options[_row(left)][speed - 1, :, place].argmin()), len(self._rates)
-        return option if option <= speeds else speeds - option
+        place = int(np.clip(round((distance - self.at[0]) / STEP_DEG), 0, len(self.at) - 1))
+        option = int(self._of(speed, left)[:, place].argmin())
+        return option - TURNS if option > TURNS else -option
+
+    def _of(self, speed: int, left: int) -> Values:
+        """The options of a speed: [end it, back, or a slower one; place]."""
+        return self._options[_row(left)][self._first[speed - 1] : self._first[speed]]
 
     def from_rest(self, distances: Values, left: int) -> Values:
         """How long it takes from rest at distances (positive) until it rests at the goal, commands at their price."""
-        least: Values = self._begun(distances, left - 1).min(axis=0)
-        return self._timing.usual + _price(left) + least
+        left = min(max(left, -MISSING), MOST + 1)
+        if left not in self._rests:
+            least: Values = self._begins.least(left - 1).min(axis=0)
+            self._rests[left] = self._timing.usual + _price(left) + least
+        found: Values = np.interp(distances, self._far, self._rests[left])
+        return found
 
-    def _allowed(self, room: float, doubts: Values) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Where each speed may end; and where each may be followed by another. The slowest may always."""
+    def _allow(self, room: float, doubts: Values) -> NDArray[np.bool_]:
+        """Where a speed may end, or turn back, and where a slower one may follow it. The slowest may always end."""
         tail, usual = self._timing.tail, self._timing.usual
         room -= STEP_DEG  # what comes between two places
-        ends = self._at + room >= (FEAR * self._rates * tail + doubts)[:, None]
-        late, then = LATE_PART * tail * self._rates[:, None], (usual + AGAIN * tail) * self._rates
+        ends = self.at + room >= (FEAR * self.rates * tail + doubts)[:, None]
+        late, then = LATE_PART * tail * self.rates, (usual + AGAIN * tail) * self.rates[:, None]
         ends[0] = True
-        return ends, ends[:, None] & (self._at + room >= (late + then)[:, :, None])
+        goes_on = [may & (self.at + room >= late[speed] + then[:speed]) for speed, may in enumerate(ends)]
+        return np.concatenate(
+            [rows for may, on in zip(ends, goes_on, strict=True) for rows in (np.tile(may, (1 + TURNS, 1)), on)]
+        )
+
+    def _ahead(self) -> tuple[_Ahead, _Ahead, _Ahead]:
+        """What is before it after a slower speed took the place of one: [(speed, other); place]; after it turned back
+        beyond the goal: [(speed, other); place]; and from rest: [speed; distance].
+        """
+        usual = self._timing.usual
+        speeds, others = np.tril_indices(len(self.rates), -1)
+        reaches = self.rates[others] * np.maximum(0.0, usual - self._slows[speeds, others])
+        follows = _Ahead(self, others, self.at, reaches)
+        speeds, others = np.indices((len(self.rates), TURNS)).reshape(2, -1)
+        reaches = self.rates[others] * np.maximum(0.0, usual - self._stops[speeds])
+        turns = _Ahead(self.back, others, -self.at[: self._behind], reaches)
+        self._far = np.arange(0.0, self.at[-1] + self.rates[TURNS - 1] * usual + STEP_DEG, STEP_DEG)
+        return follows, turns, self._from_rest_at(self._far)
+
+    def _from_rest_at(self, distances: Values) -> _Ahead:
+        return _Ahead(self, np.arange(len(self.rates)), distances, self.rates * self._timing.usual)
 
     def _reckon(self, left: int) -> None:
         """One command more is left."""
-        speeds, places = len(self._rates), len(self._at)
-        values = np.full((speeds, 1 + speeds + TURNS, places), NEVER_S)
-        values[:, 0] = self._ended(left)
-        values[:, 1 : 1 + speeds], values[:, 1 + speeds :] = self._followed(left - 1), self._turned(left - 1)
-        values = self._mean(values)
-        values[:, 0][~self._ends] = NEVER_S
-        values[:, 1 : 1 + speeds][~self._goes_on] = NEVER_S
-        values[:, 1 + speeds :][~np.broadcast_to(self._ends[:, None], (speeds, TURNS, places))] = NEVER_S
-        best = values.min(axis=1) + _price(left)
+        ended, turned, followed = self._ended(left), self._turned(left - 1), self._follows.least(left - 1)
+        values, slower = np.empty(self._allowed.shape), 0
+        for speed, first in enumerate(self._first[:-1]):
+            values[first], values[first + 1 : first + 1 + TURNS] = ended, turned[speed]
+            follows = followed[slower : slower + speed]
+            values[first + 1 + TURNS : self._first[speed + 1]] = self._slows[speed, :speed, None] + follows
+            slower += speed
+        values = self._about.mean(values)
+        values[~self._allowed] = NEVER_S
         self._options.append(values)
-        self._best.append(np.minimum.accumulate(best - self._at / self._rates[:, None], axis=1))
+        best = np.minimum.reduceat(values, self._first[:-1]) + _price(left)
+        self.best.append(np.minimum.accumulate(best - self.at / self.rates[:, None], axis=1))
 
     def _ended(self, left: int) -> Values:
         """Where it rests at a place: nothing more, or what it takes to put that right."""
-        off, after = np.abs(self._at), left - (LEG - 1)
-        again = np.where(self._at < 0, self.back.from_rest(off, after), self.from_rest(off, after))
+        off, after = np.abs(self.at), left - (LEG - 1)
+        again = np.where(self.at < 0, self.back.from_rest(off, after), self.from_rest(off, after))
         missed: Values = np.clip((off - self._near) / STEP_DEG + 0.5, 0.0, 1.0)
         return missed * (MISS * self._timing.usual + _price(left - 1) + again)
 
-    def _followed(self, left: int) -> Values:
-        """Where another speed takes the place of one at a place: [speed; other; place], of slower ones."""
-        usual, found = self._timing.usual, np.full((*self._slows.shape, len(self._at)), NEVER_S)
-        speeds, others = np.tril_indices(len(self._rates), -1)
-        slows = self._slows[speeds, others]
-        reaches = self._rates[others] * np.maximum(0.0, usual - slows)
-        found[speeds, others] = slows[:, None] + self._least(others, self._at, reaches, left)
-        return found
-
     def _turned(self, left: int) -> Values:
         """Where one turns back at a place: [speed; other; place]; before the goal that leads away from it."""
-        found = np.empty((len(self._rates), TURNS, len(self._at)))
-        speeds, others = np.indices(found.shape[:2]).reshape(2, -1)
-        reaches = self._rates[others] * np.maximum(0.0, self._timing.usual - self._stops[speeds])
-        back = self.back._least(others, -self._at[: self._behind], reaches, left)
-        found[:, :, : self._behind] = back.reshape(len(self._rates), TURNS, -1)
-        farther = self._at[self._behind :] + self._rates[:TURNS, None] * self._timing.usual
-        away = self.from_rest(farther.ravel(), left)  # its start is answered after as long
-        found[:, :, self._behind :] = away.reshape(farther.shape)
+        found = np.empty((len(self.rates), TURNS, len(self.at)))
+        found[:, :, : self._behind] = self._turns.least(left).reshape(len(self.rates), TURNS, -1)
+        farther = self.at[self._behind :] + self.rates[:TURNS, None] * self._timing.usual
+        found[:, :, self._behind :] = self.from_rest(farther, left)  # its start is answered after as long
         return self._stops[:, None, None] + found
 
-    def _begun(self, distances: Values, left: int) -> Values:
-        """Where each speed begins from rest: [speed; distance]."""
-        return self._least(np.arange(len(self._rates)), distances, self._rates * self._timing.usual, left)
 
-    def _least(self, speeds: NDArray[np.intp], distances: Values, reaches: Values, left: int) -> Values:
-        """With speeds from distances on, until the best place for the next command: [speed; distance].
+class _Ahead:
+    """With some speeds from distances on, until the best place for the next command, that can act after its `reach`.
 
-        That can act after its `reach`.
-        """
-        if left < -MISSING:
-            return np.full((len(speeds), len(distances)), NEVER_S)
+    Where those are does not depend on how many commands are left, so it is reckoned once.
+    """
+
+    def __init__(self, ladder: Ladder, speeds: NDArray[np.intp], distances: Values, reaches: Values) -> None:
+        self._ladder, count = ladder, len(ladder.at)
         first = distances - reaches[:, None]
-        places = np.clip((first - self._at[0]) / STEP_DEG, 0.0, len(self._at) - 1.0)
-        value = distances / self._rates[speeds, None] + _between(self._best[_row(left)][speeds], places)
-        return np.where(first < self._at[0], NEVER_S, value)
+        places = np.clip((first - ladder.at[0]) / STEP_DEG, 0.0, count - 1.0)
+        whole = np.minimum(places.astype(int), count - 2)
+        self._before, self._part = whole + (speeds * count)[:, None], places - whole
+        self._takes, self._never = distances / ladder.rates[speeds, None], first < ladder.at[0]
 
-    def _mean(self, values: Values) -> Values:
-        """The mean over where a command may act that should act at a place: [speed; option; place]."""
-        count, mean, middle = values.shape[-1], np.empty_like(values), np.arange(values.shape[-1]) + 0.5
-        halves = np.maximum(0.5, self._spreads / STEP_DEG)
-        edge = int(halves.max()) + 2
-        sums = np.zeros((*values.shape[:-1], edge + count + 1 + edge))
-        np.cumsum(values, axis=-1, out=sums[..., edge + 1 : edge + 1 + count])
-        sums[..., edge + 1 + count :] = sums[..., edge + count, None]
-        for speed, half in enumerate(halves):
-            width = np.minimum(middle + half, count) - np.maximum(middle - half, 0.0)
-            low, high = (_from(sums[speed], edge + 0.5 + to, count) for to in (-half, half))
-            mean[speed] = (high - low) / width
+    def least(self, left: int) -> Values:
+        """How long that takes, with so many commands left: [speed; distance]."""
+        if left < -MISSING:
+            return np.full(self._takes.shape, NEVER_S)
+        value: Values = self._takes + _between(self._ladder.best[_row(left)].ravel(), self._before, self._part)
+        value[self._never] = NEVER_S
+        return value
+
+
+class _About:
+    """The mean over where a command may act that should act at a place, so many `places` sooner or later.
+
+    `places`: by speed; `options`: how many rows each has.
+    """
+
+    def __init__(self, places: Values, options: NDArray[np.intp], count: int) -> None:
+        halves, middle = np.repeat(np.maximum(0.5, places), options)[:, None], np.arange(count) + 0.5
+        self._edge = int(halves.max()) + 2
+        self._over = 1.0 / (np.minimum(middle + halves, count) - np.maximum(middle - halves, 0.0))
+        self._sums = np.zeros((len(halves), 2 * self._edge + count + 1))
+        rows = np.arange(len(halves))[:, None] * self._sums.shape[1]
+        first, last = (self._edge + 0.5 + to for to in (-halves, halves))
+        self._low, self._high = (rows + begin.astype(int) + np.arange(count) for begin in (first, last))
+        self._first, self._last = first % 1.0, last % 1.0
+
+    def mean(self, values: Values) -> Values:
+        """Of all rows: [option; place]."""
+        begin, end = self._edge + 1, self._edge + 1 + values.shape[1]
+        np.cumsum(values, axis=1, out=self._sums[:, begin:end])
+        self._sums[:, end:] = self._sums[:, end - 1, None]
+        sums = self._sums.ravel()
+        mean: Values = _between(sums, self._high, self._last) - _between(sums, self._low, self._first)
+        mean *= self._over
         return mean
+
+
+def _between(values: Values, before: NDArray[np.intp], part: Values) -> Values:
+    """Values between one and the next."""
+    first = values.take(before, mode="clip")  # checks nothing, and there is nothing to check
+    between: Values = first + part * (values[1:].take(before, mode="clip") - first)
+    return between
 
 
 def _row(left: int) -> int:
@@ -166,20 +214,3 @@ def _row(left: int) -> int:
 def _price(left: int) -> float:
     """What the command costs that is one of so many left, seconds."""
     return PRICE_S if left > 0 else OVER_S
-
-
-def _between(rows: Values, index: Values) -> Values:
-    """The values of rows between their points."""
-    whole = np.minimum(index.astype(int), rows.shape[-1] - 2)
-    before = np.take_along_axis(rows, whole, axis=-1)
-    after = np.take_along_axis(rows, whole + 1, axis=-1)
-    between: Values = before + (index - whole) * (after - before)
-    return between
-
-
-def _from(rows: Values, begin: float, count: int) -> Values:
-    """So many values of rows, one apart, the first between their points."""
-    whole = int(begin)
-    before = rows[:, whole : whole + count]
-    values: Values = before + (begin - whole) * (rows[:, whole + 1 : whole + 1 + count] - before)
-    return values

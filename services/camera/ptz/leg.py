@@ -67,7 +67,7 @@ def choose(ways: dict[int, Way], skill: Skill, *, left: int = 12, runs: dict[int
 def _speeds(ways: dict[int, Way]) -> Iterator[dict[int, int]]:
     axes = list(ways)
     choices = [
-        [one for one in way.pace.speeds if one == 1 or way.pace.rate(one) <= way.fastest] for way in ways.values()
+        [one for one in way.rates.speeds if one == 1 or way.rates.rate(one) <= way.fastest] for way in ways.values()
     ]
     for first in choices[0]:
         if len(axes) == 1:
@@ -80,7 +80,7 @@ def _part(outlook: Outlook, axis: int, speed: int, left: int) -> Part:
     """An axis on its own: short of the goal where a late end would do harm."""
     way = outlook.ways[axis]
     short = outlook.short(axis, speed, abs(way.distance), left)
-    return Part(speed, held_for(way.pace, speed, abs(way.distance) - short), -short, short > way.near)
+    return Part(speed, held_for(way.rates, speed, abs(way.distance) - short), -short, short > way.near)
 
 
 def _legs(outlook: Outlook, speeds: dict[int, int], left: int) -> Iterator[Leg]:
@@ -105,7 +105,7 @@ def _legs(outlook: Outlook, speeds: dict[int, int], left: int) -> Iterator[Leg]:
 
 def _ending(part: Part, held: float, way: Way) -> Part:
     """The same axis, held longer or shorter than it wants."""
-    return Part(part.speed, held, part.off + (held - part.held) * way.pace.rate(part.speed), part.feared)
+    return Part(part.speed, held, part.off + (held - part.held) * way.rates.rate(part.speed), part.feared)
 
 
 def _judged(leg: Leg, outlook: Outlook, left: int, runs: dict[int, int]) -> Leg:
@@ -113,14 +113,14 @@ def _judged(leg: Leg, outlook: Outlook, left: int, runs: dict[int, int]) -> Leg:
     for axis, part in leg.parts.items():
         way = ways[axis]
         spread = outlook.spread(axis, part.speed, part.held, left)
-        beyond = part.off + way.pace.rate(part.speed) * skill.timing.tail - way.room
+        beyond = part.off + way.rates.rate(part.speed) * skill.timing.tail - way.room
         if beyond > (CRAWL_DEG if part.speed == 1 else 0.0):
             return replace(leg, cost=DANGER + beyond)  # a late end may push against a stop
         chances.append(chance(part.off, spread, way.near))
         if chances[-1] < 1.0:
             misses[axis] = max(way.near, abs(part.off)) + spread / 2
     misses |= {axis: abs(way.distance) for axis, way in ways.items() if axis not in leg.parts}
-    known = all(ways[axis].pace.known(part.speed) for axis, part in leg.parts.items())
+    known = all(ways[axis].rates.known(part.speed) for axis, part in leg.parts.items())
     running = {axis: part.speed for axis, part in leg.parts.items()} == runs
     after = left - (LEG - 1 if leg.feared else LEG) - (not leg.joint) - (len(misses) > 1)
     after += running - looks_in(leg.held, known=known)

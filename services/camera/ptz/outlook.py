@@ -8,9 +8,10 @@ time. Pure. Not here: both axes together, which is `leg.py`.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import exp, inf, log, sqrt
 
-from services.camera.ptz.pace import STOP_LATE, Pace
+from services.camera.ptz.pace import Pace, Rates
 from services.camera.ptz.skill import DITHER_DEG, Skill
 
 NOISE_DEG = 0.05  # of a reading, beside what is learnt
@@ -43,6 +44,11 @@ class Way:
     near: float
     fastest: float = inf
 
+    @cached_property
+    def rates(self) -> Rates:
+        """What is known of the axis by now."""
+        return Rates(self.pace)
+
 
 @dataclass
 class Outlook:
@@ -53,9 +59,9 @@ class Outlook:
     known: dict[tuple[int, int, int], float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        paces = [way.pace for way in self.ways.values()]
-        learnt = all(2 * sum(map(pace.known, pace.speeds)) >= len(pace.speeds) for pace in paces)
-        self._thrifty = len(paces) > 1 and learnt  # one axis has commands enough, and what is not known is to be seen
+        every = [way.rates for way in self.ways.values()]
+        learnt = all(2 * sum(map(rates.known, rates.speeds)) >= len(rates.speeds) for rates in every)
+        self._thrifty = len(every) > 1 and learnt  # one axis has commands enough, and what is not known is to be seen
         self._dithers = self.skill.dithers and learnt
 
     def rung(self, left: int) -> float:
@@ -65,7 +71,7 @@ class Outlook:
     def spread(self, axis: int, speed: int, held: float, left: int) -> float:
         """How far from where it should a leg may end, or be read to; what dithers counts where it is the last one."""
         dither = DITHER_DEG if self._dithers and left <= LEG else 0.0
-        return spread_of(self.ways[axis].pace, speed, held, self.skill) + dither
+        return spread_of(self.ways[axis].rates, speed, held, self.skill) + dither
 
     def short(self, axis: int, speed: int, distance: float, left: int) -> float:
         """How far before the goal a leg has to end at the latest, for fear of a late end; no more than the distance.
@@ -76,7 +82,7 @@ class Outlook:
         way = self.ways[axis]
         short = feared(way, speed, distance, self.skill)
         if left <= LAST and not self.skill.dithers:
-            rate = way.pace.rate(speed)
+            rate = way.rates.rate(speed)
             sure = way.near - self.spread(axis, speed, way.near / rate, left)
             short = max(short, min(EARLY * rate * self.skill.timing.tail, sure))
         return min(short, distance)
@@ -92,7 +98,7 @@ class Outlook:
         if key not in self.known:
             self.known[key] = NEVER_S  # until it is known better
             self.known[key] = min(
-                self._leg(axis, exp(step / FINE), speed, left) for speed in self.ways[axis].pace.speeds
+                self._leg(axis, exp(step / FINE), speed, left) for speed in self.ways[axis].rates.speeds
             )
         return self.known[key]
 
@@ -101,8 +107,8 @@ class Outlook:
         short = self.short(axis, speed, distance, left)
         if short >= distance and speed > 1:
             return NEVER_S
-        held = max(self.skill.timing.usual, held_for(way.pace, speed, distance - short))
-        looks = looks_in(held, known=way.pace.known(speed))
+        held = max(self.skill.timing.usual, held_for(way.rates, speed, distance - short))
+        looks = looks_in(held, known=way.rates.known(speed))
         held += OVER_S * max(0, LEG + looks - max(0, left))
         left -= looks
         if short > way.near:
@@ -119,30 +125,30 @@ def looks_in(held: float, *, known: bool) -> int:
 
 def feared(way: Way, speed: int, distance: float, skill: Skill) -> float:
     """How far before the goal a leg has to end, since a late end would push against the stop behind it."""
-    held = held_for(way.pace, speed, distance)
-    fear = way.pace.rate(speed) * skill.timing.tail + 2 * doubt(way.pace, speed, held, skill)
+    held = held_for(way.rates, speed, distance)
+    fear = way.rates.rate(speed) * skill.timing.tail + 2 * doubt(way.rates, speed, held, skill)
     short = max(0.0, fear - way.room)
     return min(short, CRAWL_DEG) if speed == 1 else short
 
 
-def held_for(pace: Pace, speed: int, distance: float) -> float:
+def held_for(rates: Rates, speed: int, distance: float) -> float:
     """How long from the effect of a start to that of its end for a distance (positive)."""
-    rate, slow = pace.rate(speed), pace.slow
+    rate, slow = rates.rate(speed), rates.slow
     if distance >= slow * rate * rate:
-        return distance / rate - pace.other(STOP_LATE)
-    return sqrt(max(0.0, distance) * slow) - pace.other(STOP_LATE)  # it never gets to its speed
+        return distance / rate - rates.stop_late
+    return sqrt(max(0.0, distance) * slow) - rates.stop_late  # it never gets to its speed
 
 
-def spread_of(pace: Pace, speed: int, held: float, skill: Skill) -> float:
+def spread_of(rates: Rates, speed: int, held: float, skill: Skill) -> float:
     """How far from where it should a leg may end."""
-    return pace.rate(speed) * skill.timing.spread + doubt(pace, speed, held, skill) + NOISE_DEG
+    return rates.rate(speed) * skill.timing.spread + doubt(rates, speed, held, skill) + NOISE_DEG
 
 
-def doubt(pace: Pace, speed: int, held: float, skill: Skill) -> float:
+def doubt(rates: Rates, speed: int, held: float, skill: Skill) -> float:
     """How far a leg may go wrong for not knowing the rate; in a long one readings tell it on the way."""
-    doubt, long = pace.doubt(speed), LONG * skill.timing.usual
+    doubt, long = rates.doubt(speed), LONG * skill.timing.usual
     if held > long:
-        return min(doubt, READ_ON_THE_WAY * pace.rate(speed)) * long
+        return min(doubt, READ_ON_THE_WAY * rates.rate(speed)) * long
     return doubt * max(0.0, held)
 
 

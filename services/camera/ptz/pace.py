@@ -238,6 +238,27 @@ class Pace:
         return _travel(mean, count, told, at)[0]
 
 
+class Rates:
+    """What is known of an axis at one moment, as its `Pace` tells it: for who asks for it thousands of times."""
+
+    def __init__(self, pace: Pace) -> None:
+        self.speeds, self.slow, self.stop_late = pace.speeds, pace.slow, pace.other(STOP_LATE)
+        self._rates, self._doubts = ([ask(speed) for speed in pace.speeds] for ask in (pace.rate, pace.doubt))
+        self._known = [pace.known(speed) for speed in pace.speeds]
+
+    def rate(self, speed: int) -> float:
+        """Degrees per second, positive."""
+        return self._rates[speed - 1]
+
+    def doubt(self, speed: int) -> float:
+        """The standard deviation of a rate."""
+        return self._doubts[speed - 1]
+
+    def known(self, speed: int) -> bool:
+        """Whether a rate is known well enough to time a stop by it."""
+        return self._known[speed - 1]
+
+
 def taught(mean: Vector, cov: Vector, slope: Vector, wrong: float, noise: float) -> tuple[Vector, Vector]:
     """Numbers and their covariance after what changes by `slope` with them was `wrong`; `noise`: standard deviation.
 
