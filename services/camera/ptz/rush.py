@@ -1,6 +1,8 @@
 """The start at full speed that begins a way of several hops: one command, where hops would be many.
 
-It goes on until the goal is within reach of a hop, that takes its place in flight. Not here: the hops (`hopping.py`).
+It goes on until the goal is within reach of a hop, that takes its place in flight. One axis leads; the other one has a
+speed with which it stays before its goal, and in the course of it another one, where that saves hops. Not here: the
+hops (`hopping.py`).
 """
 
 from __future__ import annotations
@@ -10,12 +12,16 @@ from typing import cast
 from services.camera.plan import Plan, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.helm import Helm, levels_of, sign
+from services.camera.ptz.ladder import AGAIN
 from services.camera.ptz.pace import Pace
 from services.camera.requests import Reading, Status
 
 FEARED = 1.0  # of the doubt about a rate, where a stop is near
 MOST_HOPS = 4  # are left, although zoom has to wait for them
 BULK = 1.5  # answers: one that is shorter is not worth it
+SHARES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of it, the axis beside may have its first speed; then another one,
+FARTHER = 0.6  # where that leads it so much farther, of what a hop reaches
+LOOKS = 4.0  # answers that the looks before its end take
 LATE_LOOK = 2.0  # answers: a look as late as that does not delay what it is for
 
 
@@ -34,11 +40,16 @@ def rush(helm: Helm, reaches: tuple[float, float], now: float, *, zooms: bool) -
     held = min(held, max(early, (abs(way) - MOST_HOPS * reaches[lead]) / rates[lead]))
     if held < BULK * timing.usual:
         return now
-    turning = {axis: _along(helm, axis, way, held) * sign(way) for axis, way in ways.items() if helm.skill.diagonals}
-    turning[lead] = pace.speeds[-1] * sign(way)
-    now = (yield from helm.start(levels_of(turning))).received
-    level = pace.speeds[-1]
+    level, other = pace.speeds[-1], TILT if lead == PAN else PAN
+    first = _first(helm, other, ways[other], held, reaches[other]) if pace.known(level) else held
+    beside = _along(helm, other, ways[other], first)
+    now = (yield from helm.start(levels_of({lead: level * sign(way), other: beside * sign(ways[other])}))).received
     end = helm.course.origin[lead] + sign(way) * (held * rates[lead] + pace.change(level) * pace.rate(level) / 2)
+    if first < held:
+        now = yield from wait(now + first - timing.usual)
+        left = helm.way(other, now)
+        beside = _along(helm, other, left, held - first, beside)
+        now = (yield from helm.start(levels_of({lead: level * sign(way), other: beside * sign(left)}))).received
     for early in (True, False):  # once soon, as long as the speed is not known, and once before the end
         ends = helm.course.end_for(lead, end, now)
         unsure = helm.course.model_doubt(lead, ends) / rates[lead]
@@ -82,11 +93,35 @@ def _zooming(helm: Helm) -> float:
     return abs(helm.aim[ZOOM] - helm.course.origin[ZOOM]) / helm.skill.drive(ZOOM).rate(1)
 
 
-def _along(helm: Helm, axis: int, way: float, held: float) -> int:
-    """The speed of an axis beside the other: it stays before its goal, and if that ends late before its stop."""
-    pace, room = helm.skill.paces[axis], helm.room(axis, way)
+def _first(helm: Helm, axis: int, way: float, held: float, reach: float) -> float:
+    """For how long the axis beside has its first speed: all the time, or until another one leads it clearly farther."""
+    timing = helm.skill.timing
+    last = max(LOOKS * timing.usual, timing.usual + timing.tail)  # a late answer delays nothing that comes after it
+    parts = [share * held for share in SHARES if (1 - share) * held >= last and share * held >= 2 * timing.usual]
+    covers = {first: _covered(helm, axis, way, held, first) for first in (held, *parts)}
+    best = max(covers, key=lambda first: covers[first])
+    return best if covers[best] > covers[held] + FARTHER * reach else held
+
+
+def _covered(helm: Helm, axis: int, way: float, held: float, first: float) -> float:
+    """How far the axis beside goes that has its first speed for so long."""
+    pace, one = helm.skill.paces[axis], _along(helm, axis, way, first)
+    goes = pace.rate(one) * first if one else 0.0
+    other = _along(helm, axis, way - sign(way) * goes, held - first, one) if first < held else 0
+    return goes + (pace.rate(other) * (held - first) if other else 0.0)
+
+
+def _along(helm: Helm, axis: int, way: float, held: float, before: int = 0) -> int:
+    """The speed of an axis beside the other: it stays before its goal, and if that ends late before its stop.
+
+    `before`: the speed that it has until then, and longer if that is late.
+    """
+    if not helm.skill.diagonals:
+        return 0
+    pace, tail = helm.skill.paces[axis], helm.skill.timing.tail
+    room = helm.room(axis, way) - (AGAIN * tail * pace.rate(before) if before else 0.0)
     for speed in reversed(pace.speeds):
-        late = _most(pace, speed) * (held + helm.skill.timing.tail)
+        late = _most(pace, speed) * (held + tail)
         if pace.rate(speed) * held <= abs(way) and late <= abs(way) + room:
             return speed
     return 0
