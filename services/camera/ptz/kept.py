@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from services.camera.ptz.pace import Pace
 from services.camera.ptz.planes import Planes
-from services.camera.ptz.skill import KEEP, Honours, RelativeForm, Sense, Skill
-from services.camera.ptz.zoom_rate import ZoomRate
+from services.camera.ptz.skill import KEEP, ZOOM_UNSURE, Honours, RelativeForm, Sense, Skill
+from services.camera.ptz.zoom_rate import Fit, ZoomRate
 from services.camera.requests import Identity
 from services.whole_file import write_whole
 
@@ -55,6 +55,7 @@ class _Kept(BaseModel):
     diagonals: bool
     zoom_steps: list[float]
     zoom_rate: Pair | None = None
+    zoom_fits: list[Fit] = []
     honours: dict[str, Honours]
     beside: dict[str, Pair]
     presets: dict[int, Triple]
@@ -133,6 +134,7 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
         diagonals=skill.diagonals,
         zoom_steps=skill.zoom_steps,
         zoom_rate=skill.zoom_rate.known(),
+        zoom_fits=skill.zoom_rate.fits,
         honours=skill.honours,
         beside=skill.beside,
         presets=skill.presets,
@@ -177,6 +179,7 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
     skill.surprise, skill.arrives_late = kept.surprise, kept.arrives_late
     skill.steady, skill.exact = kept.steady, kept.exact
     if kept.zoom_rate is not None:
-        skill.zoom_rate = ZoomRate(*kept.zoom_rate)
+        rate, doubt = kept.zoom_rate
+        skill.zoom_rate = ZoomRate(rate, ZOOM_UNSURE if kept.zoom_fits else doubt, kept.zoom_fits)
     skill.diagonals, skill.zoom_steps, skill.honours = kept.diagonals, kept.zoom_steps, kept.honours
     skill.beside, skill.presets = kept.beside, kept.presets

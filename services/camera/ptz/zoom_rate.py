@@ -7,7 +7,7 @@ what is learnt of zoom in moves (`zoom_drive.py`, `scale.py`), the looks themsel
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +22,35 @@ NOISE_LEVELS, NOISE_S = 0.03, 0.006  # of where a step begins; of the moment tha
 ODD = 0.01  # of the looks tell nothing
 EXACT = 0.003  # of the rate stays in doubt,
 LONGER = 1 + 2 * EXACT  # so that it may be slower than all that is reckoned with
+UNLIKELY = 0.001  # beside the likeliest: not worth to be kept
+OTHERWISE = 1e-5  # of what was kept is doubted, so that something else can be learnt
 
 Grid = NDArray[np.float64]
+Fit = tuple[float, float, float]  # a rate, levels/s; the seconds to it; how likely they are
 
 
 class ZoomRate:
     """What is known of one way to let zoom go: by start and stop, or by the firmware's own moves."""
 
-    def __init__(self, rate: float, doubt: float) -> None:
-        """A guess, and which share of it is doubted: one standard deviation."""
+    def __init__(self, rate: float, doubt: float, fits: Sequence[Fit] = ()) -> None:
+        """A guess, and which share of it is doubted: one standard deviation. `fits`: what was known another time.
+
+        With them, the guess is what else may be.
+        """
         before = np.exp(-np.square(np.log(RATES / rate) / doubt) / 2)
         self._likely: Grid = before * np.exp(-SLOWS_S / OFTEN_S)  # [seconds to its rate; rate]
+        if fits:
+            self._likely *= OTHERWISE * sum(likely for *_, likely in fits) / self._likely.sum()
+        for one, seconds, likely in fits:
+            self._likely[np.abs(SLOWS_S - seconds).argmin(), np.abs(RATES - one).argmin()] += likely
+
+    @property
+    def fits(self) -> list[Fit]:
+        """What fits all looks, but for what hardly does."""
+        share = self._likely / self._likely.max()
+        slows, rates = np.nonzero(share > UNLIKELY)
+        fits = np.stack([RATES[rates], SLOWS_S[slows, 0], share[slows, rates]], axis=1).round(4)
+        return [(rate, seconds, likely) for rate, seconds, likely in fits.tolist()]
 
     def comes(self, ways: Iterable[float], after: float) -> float | None:
         """When it has probably come the next of some ways, seconds from its beginning; None: all are behind it."""

@@ -103,3 +103,17 @@ def test_nor_after_so_many_looks_that_all_but_one_rate_is_ruled_out() -> None:
         for _ in range(15):
             sweep(known, rng, rate, 0.1, 2.0)
         assert RANGE / rate + 0.1 <= known.lasts(RANGE, 0.01) < 1.05 * (RANGE / rate + 0.1)
+
+
+def test_what_was_learnt_another_time_is_known_again_and_something_else_can_be_learnt() -> None:
+    known, rng = ZoomRate(4.0, 0.9), random.Random(7)
+    for _ in range(12):
+        sweep(known, rng, 2.7, 0.1, 2.0)
+    again = ZoomRate(known.known()[0], 0.5, known.fits)
+    assert again.known()[0] == pytest.approx(known.known()[0], rel=0.001)
+    assert again.known()[1] == pytest.approx(known.known()[1], rel=0.2)
+    for levels in (1.0, 2.0, 8.0):
+        assert again.lasts(levels, 0.01) == pytest.approx(known.lasts(levels, 0.01), abs=0.01)
+    for _ in range(12):
+        sweep(again, rng, 1.9, 0.1, 2.0)
+    assert again.known()[0] == pytest.approx(1.9, rel=0.02)
