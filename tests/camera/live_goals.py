@@ -4,7 +4,8 @@ What a user would measure with a watch: from the order to `done`, with the servi
 requests, and a picture that is watched meanwhile; from a cold start, and after `apartment calibrate ptz`. Without the
 service, in virtual time: `goals.py`. Two firmwares are measured at once, for most of the time they wait for motors;
 with four, two cores are so busy with pictures that answers come a hundredth of a second later. A camera that turns 27
-degrees a second is elsewhere then, and nothing but one more look tells.
+degrees a second is elsewhere then, and nothing but one more look tells. The seed draws the goals, the pauses between
+them and how long the camera takes to answer, so one seed tells of one camera.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ def _row(case: tuple[str, bool], goals: list[Goal], seed: int) -> LiveRow:
 def _measured(firmware: str, calibrated: bool, folder: Path, goals: list[Goal], seed: int) -> LiveRow:
     found: list[_Met] = []
     rng = Random(seed)
-    with small_flat(folder, simulator={"profile": firmware}) as flat, flat.client("camera/ip1/#") as bus:
+    with small_flat(folder, simulator={"profile": firmware, "seed": seed}) as flat, flat.client("camera/ip1/#") as bus:
         door = flat.doors["ip1"]
         if calibrated:
             learnt = bus.order("ip1", "CalibratePtz", "True", timeout_s=CALIBRATES_S)
