@@ -37,7 +37,7 @@ class Ladder:
     """
 
     def __init__(self, way: Way, skill: Skill, back: Ladder | None = None) -> None:
-        self.back, self._near, self._timing = back or self, way.near, skill.timing
+        self._back, self._near, self._timing = back, way.near, skill.timing
         self.rates = np.array([way.pace.rate(speed) for speed in way.pace.speeds])
         self._slows = np.array([[way.pace.change(one, to) for to in way.pace.speeds] for one in way.pace.speeds])
         self._stops = np.array([way.pace.change(speed) for speed in way.pace.speeds])
@@ -50,12 +50,17 @@ class Ladder:
         self._first = np.cumsum([0, *(1 + TURNS + slower for slower in range(len(self.rates)))])  # option of a speed
         self._allowed = self._allow(way.room, FEARED * LONG * skill.timing.usual * doubts)
         self._about = _About(spreads / STEP_DEG, np.diff(self._first), len(self.at))
-        self._follows, self._turns, self._begins = self._ahead()
         self._options: list[Values] = []  # by commands left: [of each speed end it, back, or a slower one; place]
         self.best: list[Values] = []  # by commands left: [speed; place], less the time to come there
+        self._follows, self._turns, self._begins = self._ahead()
         self._rests: dict[int, Values] = {}  # by commands left: from rest, at `_far`
         for left in range(-MISSING, MOST + 1):
             self._reckon(left)
+
+    @property
+    def back(self) -> Ladder:
+        """The way back; it holds no reference to itself, nor does what it is made of: megabytes would stay for long."""
+        return self._back or self
 
     def begins(self, distance: float, left: int) -> int:
         """The speed from rest; `left` commands for it and all that follow, but for the look at the end."""
@@ -157,7 +162,7 @@ class _Ahead:
     """
 
     def __init__(self, ladder: Ladder, speeds: NDArray[np.intp], distances: Values, reaches: Values) -> None:
-        self._ladder, count = ladder, len(ladder.at)
+        self._best, count = ladder.best, len(ladder.at)
         first = distances - reaches[:, None]
         places = np.clip((first - ladder.at[0]) / STEP_DEG, 0.0, count - 1.0)
         whole = np.minimum(places.astype(int), count - 2)
@@ -168,7 +173,7 @@ class _Ahead:
         """How long that takes, with so many commands left: [speed; distance]."""
         if left < -MISSING:
             return np.full(self._takes.shape, NEVER_S)
-        value: Values = self._takes + _between(self._ladder.best[_row(left)].ravel(), self._before, self._part)
+        value: Values = self._takes + _between(self._best[_row(left)].ravel(), self._before, self._part)
         value[self._never] = NEVER_S
         return value
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import weakref
 from collections.abc import Iterator
 from statistics import mean
 
@@ -121,3 +122,11 @@ def test_what_is_not_known_goes_slower_near_a_stop(skill: Skill) -> None:
         float(Ladder(Way(20.0, 5.0, one.paces[1], NEAR), one).from_rest(np.array([20.0]), 9)[0]) for one in (skill, new)
     ]
     assert least[0] < least[1]
+
+
+def test_nothing_of_it_stays_in_memory(skill: Skill) -> None:
+    """A move makes two or three, of megabytes each, and what refers to itself stays until the collector comes."""
+    ladder = down(skill, 60.0, 100.0)
+    both = weakref.ref(ladder), weakref.ref(ladder.back)
+    del ladder
+    assert [one() for one in both] == [None, None]
