@@ -39,7 +39,7 @@ from services.command_line.options import CONFIG, SERVICES, Camera, Config, Json
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.payloads import OrderResult
-from services.supervisor import Supervisor, commands, processes
+from services.supervisor import Supervisor, commands, processes, simulated
 from services.topics import asyncapi, page
 
 app = typer.Typer(
@@ -54,7 +54,8 @@ def run(services: Annotated[list[str] | None, SERVICES] = None, config: Config =
     """Start services (all that the configuration has), one process each, and keep them running."""
     process.log_to_stderr()
     apartment = load(config, tuple(services) if services else None, deep=True)
-    supervisor = Supervisor(commands(processes(apartment, _names(apartment, services)), config.resolve()))
+    groups = processes(apartment, _names(apartment, services))
+    supervisor = Supervisor(commands(groups, config.resolve()), last=simulated(apartment, groups))
     broker = {"host": apartment.bus.host, "port": apartment.bus.port}
     with process.stop_signals(supervisor.stop):
         supervisor.run(lambda ready: _say(process.ready_line("run", {"broker": broker, "services": ready})))

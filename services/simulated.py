@@ -18,7 +18,7 @@ from typing import Any
 from services.client import connected
 from services.config import Apartment, load
 from services.peers import Missing, answers, embedded, free_port, mariadb, mosquitto, ros
-from services.supervisor import READY_S, Supervisor, commands, in_background, processes
+from services.supervisor import READY_S, Supervisor, commands, in_background, processes, simulated
 from services.topics import CAMERA_STATUS
 
 CONFIG = Path(__file__).parents[1] / "config"
@@ -120,7 +120,9 @@ def services_of(
     change(config)
     apartment = load(config, environment={**os.environ, **parts.environment})
     names = [name for name in apartment.instances if name not in without and (not only or name in only)]
-    supervisor = Supervisor(commands(processes(apartment, names), config), parts.environment, folder / "services.log")
+    groups = processes(apartment, names)
+    running, last = commands(groups, config), simulated(apartment, groups)
+    supervisor = Supervisor(running, parts.environment, folder / "services.log", last)
     with in_background(supervisor) as ready:
         _wait_for_cameras(apartment, names)
         yield Simulated(folder, config, apartment, parts, supervisor, ready)

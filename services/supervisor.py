@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -61,16 +61,27 @@ def commands(groups: Sequence[tuple[str, ...]], config: Path) -> dict[str, list[
     return {"+".join(group): [*python, *group, "--config", str(config)] for group in groups}
 
 
+def simulated(apartment: Apartment, groups: Sequence[tuple[str, ...]]) -> set[str]:
+    """The processes that hold nothing but simulators."""
+    rows = apartment.instances
+    return {"+".join(group) for group in groups if all(rows[one].row.section[0] == "simulators" for one in group)}
+
+
 class Supervisor:
-    """Watches its children from one thread; two threads per child only read what it prints and wait for its end."""
+    """Watches its children from one thread; two threads per child only read what it prints and wait for its end.
+
+    `last`: the children that end after all others, who need them to the end: a camera service stops its camera.
+    """
 
     def __init__(
         self,
         commands: Mapping[str, Sequence[str]],
         environment: Mapping[str, str] | None = None,
         log_file: Path | None = None,
+        last: Collection[str] = (),
     ) -> None:
         self.log_file = log_file  # for what the children log; None: our own standard error
+        self._last = last
         self.children = {name: Child(name, line) for name, line in commands.items()}
         self._environment = {**os.environ, **(environment or {}), SUPERVISED: str(os.getpid())}
         self._news: queue.SimpleQueue[tuple[str, subprocess.Popen[str] | None, str]] = queue.SimpleQueue()
@@ -145,18 +156,23 @@ class Supervisor:
         log.error("%s ended with %s; again in %.1f s", child.name, _outcome(code), pause)
 
     def _end_all(self) -> None:
-        processes = [child.process for child in self.children.values() if child.process is not None]
-        for process in processes:
-            if process.poll() is None:
-                process.send_signal(signal.SIGTERM)
-        end = time.monotonic() + GRACE_S
-        for process in processes:
-            try:
-                process.wait(max(0.0, end - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                log.error("pid %d did not end within %.0f s, killed", process.pid, GRACE_S)
-                process.kill()
-                process.wait()
+        for last in (False, True):
+            children = [child for child in self.children.values() if (child.name in self._last) is last]
+            _end([child.process for child in children if child.process is not None])
+
+
+def _end(processes: Sequence[subprocess.Popen[str]]) -> None:
+    for process in processes:
+        if process.poll() is None:
+            process.send_signal(signal.SIGTERM)
+    end = time.monotonic() + GRACE_S
+    for process in processes:
+        try:
+            process.wait(max(0.0, end - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            log.error("pid %d did not end within %.0f s, killed", process.pid, GRACE_S)
+            process.kill()
+            process.wait()
 
 
 def _outcome(code: int) -> str:

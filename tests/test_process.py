@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -18,6 +19,19 @@ import subprocess, sys
 waits = subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"], start_new_session=True)
 print('READY {"waits": %d}' % waits.pid, flush=True)
 waits.wait()
+"""
+
+ENDS = """
+import signal, sys, time
+from pathlib import Path
+own, other, takes = Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3])
+def end(*_):
+    time.sleep(takes)
+    own.write_text("later" if other.exists() else "sooner")
+    sys.exit()
+signal.signal(signal.SIGTERM, end)
+print("READY {}", flush=True)
+signal.pause()
 """
 
 
@@ -54,3 +68,14 @@ def test_a_service_is_started_again_though_a_process_of_its_own_holds_its_output
     finally:
         for pid in waiting:
             os.kill(pid, signal.SIGKILL)
+
+
+def test_what_others_need_ends_after_them(tmp_path: Path) -> None:
+    camera, service = tmp_path / "camera", tmp_path / "service"
+    lines = {
+        "simulated-camera": [sys.executable, "-c", ENDS, str(camera), str(service), "0"],
+        "camera": [sys.executable, "-c", ENDS, str(service), str(camera), "0.5"],
+    }
+    with in_background(Supervisor(lines, last={"simulated-camera"})):
+        pass
+    assert (service.read_text(), camera.read_text()) == ("sooner", "later")
