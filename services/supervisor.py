@@ -58,13 +58,17 @@ def processes(apartment: Apartment, names: Sequence[str]) -> list[tuple[str, ...
 def commands(groups: Sequence[tuple[str, ...]], config: Path) -> dict[str, list[str]]:
     """How each process is started."""
     python = [sys.executable, "-m", "services", "serve"]
-    return {"+".join(group): [*python, *group, "--config", str(config)] for group in groups}
+    return {_called(group): [*python, *group, "--config", str(config)] for group in groups}
 
 
 def simulated(apartment: Apartment, groups: Sequence[tuple[str, ...]]) -> set[str]:
     """The processes that hold nothing but simulators."""
     rows = apartment.instances
-    return {"+".join(group) for group in groups if all(rows[one].row.section[0] == "simulators" for one in group)}
+    return {_called(group) for group in groups if all(rows[one].row.section[0] == "simulators" for one in group)}
+
+
+def _called(group: tuple[str, ...]) -> str:
+    return "+".join(group)
 
 
 class Supervisor:

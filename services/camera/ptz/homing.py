@@ -14,10 +14,10 @@ from services.camera.ptz import drive as own
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.driving import follow
 from services.camera.ptz.helm import Helm, levels_of, sign
-from services.camera.ptz.ladder import AGAIN, Ladder
+from services.camera.ptz.ladder import Ladder
 from services.camera.ptz.leg import Leg, Part
 from services.camera.ptz.outlook import Way
-from services.camera.ptz.skill import LATE_PART
+from services.camera.ptz.skill import AGAIN_PART, LATE_PART
 from services.camera.requests import Reading, Refused
 
 ALONG = 1.0
@@ -126,7 +126,7 @@ class Homing:
         before = LATE_PART * timing.tail * way.pace.rate(level) if level > 0 else 0.0
         for speed in reversed(way.pace.speeds):
             rate = way.pace.rate(speed) + 2 * way.pace.doubt(speed)
-            late = max(rate * (held + timing.tail), before + rate * (timing.usual + AGAIN * timing.tail))
+            late = max(rate * (held + timing.tail), before + rate * (timing.usual + AGAIN_PART * timing.tail))
             if rate * (held + timing.usual) <= ALONG * far and late <= far + way.room:
                 return speed * sign(way.distance)
         return 0

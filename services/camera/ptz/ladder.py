@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.camera.ptz.outlook import LEG, LONG, NOISE_DEG, OVER_S, READ_ON_THE_WAY, Way
-from services.camera.ptz.skill import LATE_PART, Skill
+from services.camera.ptz.skill import AGAIN_PART, LATE_PART, Skill
 
 STEP_DEG = 0.1  # of the distances that are reckoned with
 BEYOND_DEG = 12.0  # as far behind the goal
@@ -24,7 +24,7 @@ MISSING = 3  # commands that may be missing
 PRICE_S = 0.08  # of a command, while there are enough
 MISS = 3.0  # answers: a miss is put right from rest, and so much later
 DOUBTED, FEARED = 0.5, 2.0  # of the doubt about a rate: what counts usually, and where a stop is near
-AGAIN, FEAR = 0.5, 1.1  # parts of how late an answer may be: a second one in a row; and the one that is an end
+FEAR = 1.1  # part of how late an answer may be that is an end
 NEVER_S = 60.0
 
 Values = NDArray[np.float64]
@@ -44,6 +44,7 @@ class Ladder:
         farthest = self.rates[-1] * (FEAR * skill.timing.tail + skill.timing.usual) + FARTHER_DEG
         self.at = np.arange(-BEYOND_DEG, min(farthest, abs(way.distance) + BEYOND_DEG / 2), STEP_DEG)
         self._behind = int(np.count_nonzero(self.at < 0))  # places
+        self._far = np.arange(0.0, self.at[-1] + self.rates[TURNS - 1] * skill.timing.usual + STEP_DEG, STEP_DEG)
         doubts = np.array([way.pace.doubt(speed) for speed in way.pace.speeds])
         read = np.minimum(doubts, READ_ON_THE_WAY * self.rates)
         spreads = self.rates * skill.timing.spread + DOUBTED * LONG * skill.timing.usual * read + NOISE_DEG
@@ -100,7 +101,7 @@ class Ladder:
         tail, usual = self._timing.tail, self._timing.usual
         room -= STEP_DEG  # what comes between two places
         ends = self.at + room >= (FEAR * self.rates * tail + doubts)[:, None]
-        late, then = LATE_PART * tail * self.rates, (usual + AGAIN * tail) * self.rates[:, None]
+        late, then = LATE_PART * tail * self.rates, (usual + AGAIN_PART * tail) * self.rates[:, None]
         ends[0] = True
         goes_on = [may & (self.at + room >= late[speed] + then[:speed]) for speed, may in enumerate(ends)]
         return np.concatenate(
@@ -118,7 +119,6 @@ class Ladder:
         speeds, others = np.indices((len(self.rates), TURNS)).reshape(2, -1)
         reaches = self.rates[others] * np.maximum(0.0, usual - self._stops[speeds])
         turns = _Ahead(self.back, others, -self.at[: self._behind], reaches)
-        self._far = np.arange(0.0, self.at[-1] + self.rates[TURNS - 1] * usual + STEP_DEG, STEP_DEG)
         return follows, turns, self._from_rest_at(self._far)
 
     def _from_rest_at(self, distances: Values) -> _Ahead:

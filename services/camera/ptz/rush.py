@@ -12,8 +12,8 @@ from typing import cast
 from services.camera.plan import Plan, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.helm import Helm, levels_of, sign
-from services.camera.ptz.ladder import AGAIN
 from services.camera.ptz.pace import Pace
+from services.camera.ptz.skill import AGAIN_PART
 from services.camera.requests import Reading, Status
 
 FEARED = 1.0  # of the doubt about a rate, where a stop is near
@@ -119,7 +119,7 @@ def _along(helm: Helm, axis: int, way: float, held: float, before: int = 0) -> i
     if not helm.skill.diagonals:
         return 0
     pace, tail = helm.skill.paces[axis], helm.skill.timing.tail
-    room = helm.room(axis, way) - (AGAIN * tail * pace.rate(before) if before else 0.0)
+    room = helm.room(axis, way) - (AGAIN_PART * tail * pace.rate(before) if before else 0.0)
     for speed in reversed(pace.speeds):
         late = _most(pace, speed) * (held + tail)
         if pace.rate(speed) * held <= abs(way) and late <= abs(way) + room:

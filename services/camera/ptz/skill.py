@@ -24,6 +24,7 @@ LATENCY_S, SPREAD_S = 0.3, 0.1  # of an answer, before any was measured
 TAIL_S = 1.0  # an answer may always come so much later than usual: busy Wi-Fi does that to two in a hundred
 TAIL_PART = 3.3  # of the usual time, where that is long
 LATE_PART = 0.85  # of how late an answer may be, where a motion that it begins is ended only after it
+AGAIN_PART = 0.5  # of that, for a second one in a row
 FORGETS, WORSE = 0.998, 1.2  # of the latest answer: kept with each one more; and it may be later the next time
 SOONER_S, LATER_S, MOST_LATE_S = 0.008, 0.04, 0.5
 NEAR_DEG, NEARER_DEG = 0.42, 0.35  # a reading so near has arrived: 0.5 promised, resolution and dither taken off

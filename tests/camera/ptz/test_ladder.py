@@ -10,10 +10,10 @@ from statistics import mean
 import numpy as np
 import pytest
 
-from services.camera.ptz.ladder import AGAIN, Ladder
+from services.camera.ptz.ladder import Ladder
 from services.camera.ptz.outlook import Way
 from services.camera.ptz.pace import TILT_RATES, Pace
-from services.camera.ptz.skill import LATE_PART, Skill
+from services.camera.ptz.skill import AGAIN_PART, LATE_PART, Skill
 
 NEAR = 0.42
 BACK = Way(-10.0, 100.0, Pace(TILT_RATES), NEAR)
@@ -84,7 +84,7 @@ def test_it_ends_at_the_goal_nearly_always_and_takes_as_long_as_was_reckoned(ski
 
 @pytest.mark.parametrize("room", [1.0, 4.0, 12.0, 30.0])
 @pytest.mark.parametrize("late", range(5))
-@pytest.mark.parametrize("parts", [(1.0, 0.0), (LATE_PART, AGAIN)])
+@pytest.mark.parametrize("parts", [(1.0, 0.0), (LATE_PART, AGAIN_PART)])
 def test_no_late_answer_leads_it_to_its_stop(skill: Skill, room: float, late: int, parts: tuple[float, float]) -> None:
     """One answer as late as any, or nearly so and the next one late, too: at every place of a move."""
     tail, usual = skill.timing.tail, skill.timing.usual
