@@ -15,7 +15,7 @@ demo: $(VENV)/demo.stamp
 	@$(APARTMENT) demo $(ARGS)
 
 test: $(VENV)/dev.stamp system-packages
-	$(VENV)/bin/python -m pytest $(or $(ARGS),-n 2 --dist loadfile)
+	$(if $(ARGS),$(VENV)/bin/python -m pytest $(ARGS),./.ci/tests $(VENV)/bin/python)
 
 soak: $(VENV)/dev.stamp
 	@$(VENV)/bin/python -m tests.soak --part $(PART) --turns $(N) --seed $(SEED)
