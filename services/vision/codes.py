@@ -109,6 +109,13 @@ def grid(inner: Rows, size: int) -> NDArray[np.float32]:
     return np.pad(cells, ((0, 0), (1, 1), (1, 1)), constant_values=1.0)
 
 
+@lru_cache(maxsize=512)
+def cells(dictionary: str, marker: int) -> NDArray[np.float32]:
+    """A marker as it is printed: 0 dark, 1 light, its border and a cell of paper around, (modules + 2, modules + 2)."""
+    known = book(dictionary)
+    return np.asarray(grid(known.codes[marker][None], known.inner)[0], np.float32)
+
+
 def _through(codes: Rows, inner: int, kernel: Array | None) -> Rows:
     """The codes after a blur, which is linear: so that of each single cell, and of what is around them, will do."""
     if kernel is None:

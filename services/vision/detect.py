@@ -3,14 +3,15 @@
 Dark squares are looked for (`squares`), in the picture and in smaller ones made of it, their corners made exact
 (`corners`) and their cells matched with every code of the whole dictionary (`reading`, `codes`). The best code wins,
 and only if it is wanted: a neighbour in the dictionary is never taken for the target. What lies half in a shadow is
-read once more as if in one light (`shadow`). Who is believed is `belief`'s.
+read once more as if in one light (`shadow`). Who is believed is `belief`'s; the code of who is makes the corners more
+exact (`fit`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from services.vision import belief, codes, reading
 from services.vision.codes import DICTIONARIES, Book
 from services.vision.corners import refine, refine_many
+from services.vision.fit import fit
 from services.vision.looks import Look, around, halved, longest, near
 from services.vision.shadow import CHANGE, lit
 from services.vision.squares import WINDOW, darker_by, squares, squares_at_levels
@@ -50,12 +52,14 @@ SEARCHERS = 2  # threads: the picture itself has about as many outlines as all s
 class Detection:
     """A marker in a picture: `corners` (4, 2) in pixels, clockwise from the marker's own top-left.
 
-    Pixel centres are whole numbers. `confidence` is the correlation of the cells with the code, 0..1.
+    Pixel centres are whole numbers. `confidence` is the correlation of the cells with the code, 0..1. `by_code`: the
+    corners are those of the whole code as it lies in the picture (`fit`); else of lines along its sides (`corners`).
     """
 
     marker: int
     corners: Array
     confidence: float
+    by_code: bool = False
 
     def whole(self, width: int, height: int) -> bool:
         """Whether all of it is in the picture: a corner beyond was told by what is seen of its sides, or not at all."""
@@ -241,11 +245,19 @@ class _Search:
         detections = []
         for one in self.believed:
             if self.wanted is None or one.marker in self.wanted:
-                detections.append(Detection(one.marker, self._exact(one), min(one.correlation, 1.0)))
+                detections.append(self._detection(one))
         return sorted(detections, key=lambda d: -d.confidence)
 
+    def _detection(self, one: _Candidate) -> Detection:
+        """By its code where that can be laid over the whole of it, else by its sides."""
+        by_sides = Detection(one.marker, self._exact(one), min(one.correlation, 1.0))
+        grey = self.looks[0].grey
+        whole = by_sides.whole(*grey.shape[::-1])
+        corners = fit(grey, by_sides.corners, codes.cells(self.dictionary, one.marker)) if whole else None
+        return by_sides if corners is None else replace(by_sides, corners=corners, by_code=True)
+
     def _exact(self, one: _Candidate) -> Array:
-        """Its corners in the finest picture in which they can be told."""
+        """The corners that its sides have in the finest picture in which they can be told."""
         corners, modules = one.corners, self.book.modules
         for look in reversed([look for look in self.looks if look.scale > one.look.scale][1:]):
             here = refine_many(look.grey, look.here(corners)[None], modules)[0]

@@ -8,7 +8,7 @@ that show something else than most are left out here. One picture alone is `dete
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from services.vision import codes, reading
 from services.vision.corners import refine_many
 from services.vision.detect import Detection, detect
+from services.vision.fit import fit
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 COARSE = 8  # pixels by pixels that are compared as one
@@ -33,11 +33,11 @@ BRIGHTEST = 99.5  # percent of the pixels are darker
 
 @dataclass(frozen=True, eq=False)
 class Still:
-    """A marker seen in the mean, and in single frames: `frames` are their numbers, `corners` (n, 4, 2) in each."""
+    """A marker seen in the mean, and in single frames: `frames` are their numbers, `each` as it is there."""
 
     detection: Detection
     frames: tuple[int, ...]
-    corners: Array
+    each: tuple[Detection, ...]
 
 
 def detect_still(frames: Sequence[Picture], dictionary: str, targets: Collection[int] | None = None) -> list[Still]:
@@ -72,14 +72,21 @@ def mean(frames: Sequence[Picture]) -> Picture:
 
 
 def _again(found: Detection, frames: Sequence[Picture], chosen: Sequence[int], dictionary: str) -> Still:
-    book, corners, agreeing = codes.book(dictionary), [], []
-    code = book.seen[1][found.marker][None]
-    for number in chosen:
-        here = refine_many(frames[number], found.corners[None], book.modules)
-        if np.isnan(here).any():
-            continue
-        cells = reading.cells(frames[number], here, book.modules)
-        if reading.fits(cells.inner, code)[0, 0] >= AGREEING:
-            agreeing.append(number)
-            corners.append(here[0])
-    return Still(found, tuple(agreeing), np.array(corners).reshape(-1, 4, 2))
+    seen = {number: _in_one(found, frames[number], dictionary) for number in chosen}
+    agreeing = {number: one for number, one in seen.items() if one is not None}
+    return Still(found, tuple(agreeing), tuple(agreeing.values()))
+
+
+def _in_one(found: Detection, frame: Picture, dictionary: str) -> Detection | None:
+    """The marker as it is in one frame; None where that shows something else."""
+    book, corners = codes.book(dictionary), None
+    if found.by_code:
+        corners = fit(frame, found.corners, codes.cells(dictionary, found.marker))
+    by_code = corners is not None
+    if corners is None:
+        corners = refine_many(frame, found.corners[None], book.modules)[0]
+    if np.isnan(corners).any():
+        return None
+    cells = reading.cells(frame, corners[None], book.modules)
+    agrees = reading.fits(cells.inner, book.seen[1][found.marker][None])[0, 0] >= AGREEING
+    return replace(found, corners=corners, by_code=by_code) if agrees else None

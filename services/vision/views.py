@@ -14,7 +14,7 @@ from math import asin, degrees, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from services.vision.corners import unbent
+from services.vision import corners, fit
 from services.vision.frames import Transform
 from services.vision.lens import Lens
 
@@ -42,7 +42,7 @@ class View:
     which turn about `axes` (2, 3) in the apartment; None: about any. `focal_doubt` is the standard deviation of the
     lens's focal length as a share of it, `aside_deg` that of its axis in any direction. A picture that was `enlarged`,
     or is less exact for another reason, has coarser corners by that factor. All its sides may seem outwards or inwards
-    alike, by `bloom_px`.
+    alike, by `bloom_px`. `by_code`: the corners come from the whole code, not from the sides (`detect.Detection`).
     """
 
     lens: Lens
@@ -56,6 +56,12 @@ class View:
     bloom_px: float = BLOOM_PX
     axes: Array | None = None
     at: float = 0.0
+    by_code: bool = False
+
+    @cached_property
+    def straight(self) -> Array:
+        """The corners, put right for how the lens bends the marker."""
+        return straight(self.corners, self.lens, by_code=self.by_code)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +104,11 @@ class Sights:
         return Sights(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
+def straight(square: Array, lens: Lens, *, by_code: bool) -> Array:
+    """Corners (4, 2), pixels, of a marker that a lens bends: where they are, from where `detect` has found them."""
+    return (fit.unbent if by_code else corners.unbent)(np.asarray(square, float), lens)
+
+
 def by_place(views: Sequence[View]) -> list[list[int]]:
     """Which views are of one place, and of a marker at rest: their indexes, in the order of their times."""
     places: list[list[int]] = []
@@ -115,8 +126,8 @@ def gather(places: Sequence[Sequence[View]]) -> Sights:
     """The views of each place as one sight, of the clearest ones."""
     places = [_clearest(place) for place in places]
     first = [place[0] for place in places]
-    averaged = [average(np.array([view.corners for view in p], float), p[0].enlarged) for p in places]
-    rays = [v.lens.rays(unbent(corners, v.lens)) for v, (corners, _) in zip(first, averaged, strict=True)]
+    averaged = [average(np.array([view.straight for view in p]), p[0].enlarged) for p in places]
+    rays = [v.lens.rays(straight) for v, (straight, _) in zip(first, averaged, strict=True)]
     looking = [_mean(np.array([view.camera.rotation for view in place])) for place in places]
     return Sights(
         rays=np.array(rays).reshape(-1, 4, 2),

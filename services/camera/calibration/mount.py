@@ -115,9 +115,9 @@ class Touring:
         for _ in range(FRAMES):
             jpeg, now = yield from taken(now)
             jpegs.append(jpeg)
-        how, dictionary, ids = self.how, self.dictionary, sorted(self.known)
+        how, dictionary, ids, whole = self.how, self.dictionary, sorted(self.known), self.lens
         try:
-            shot, now = yield from study(lambda: markers_in(jpegs, how, dictionary, ids, wanted))
+            shot, now = yield from study(lambda: markers_in(jpegs, how, dictionary, ids, wanted, whole))
         except Away:  # half a picture
             return now
         self.stops.append(Seen(reading, shot))

@@ -16,6 +16,8 @@ from services.vision.board import Board, Seen, find
 from services.vision.calibrate_lens import Array
 from services.vision.detect import detect
 from services.vision.frames import Kind
+from services.vision.lens import Lens
+from services.vision.views import straight
 from services.vision.zoom import Magnification, measure
 
 TRIES, AGAIN_S = 3, 0.3  # of a picture: the camera sometimes closes without an answer
@@ -52,7 +54,7 @@ class BoardShot(Shot):
 
 @dataclass(frozen=True, eq=False)
 class MarkerShot(Shot):
-    """The markers' corners (4, 2), by id."""
+    """The markers' corners (4, 2), by id, put right for how the lens bends them."""
 
     markers: dict[int, Array]
 
@@ -81,25 +83,27 @@ def compared(wide: bytes, zoomed: bytes, how: How) -> Plan[tuple[Magnification, 
 
 
 def markers_in(
-    jpegs: Sequence[bytes], how: How, dictionary: str, known: Sequence[int], wanted: int | None
+    jpegs: Sequence[bytes], how: How, dictionary: str, known: Sequence[int], wanted: int | None, lens: Lens
 ) -> MarkerShot:
     """Looks for known markers in pictures of the same; corners are their mean, of markers that the first shows once.
 
     A marker that is hard to see is only looked for, which takes long, when it is the `wanted` one; None: all are.
     """
     first = how.upright(jpegs[0])
-    seen = {marker: corners for marker, corners in _once(first, dictionary, None).items() if marker in known}
+    through = lens.scaled(first.shape[1], first.shape[0])
+    seen = {marker: corners for marker, corners in _once(first, dictionary, None, through).items() if marker in known}
     if wanted is None or wanted not in seen:
-        seen = {**seen, **_once(first, dictionary, known if wanted is None else [wanted])}
+        seen = {**seen, **_once(first, dictionary, known if wanted is None else [wanted], through)}
     found = {marker: [corners] for marker, corners in seen.items()}
     for jpeg in jpegs[1:] if found else ():
-        for marker, corners in _once(how.upright(jpeg), dictionary, sorted(found)).items():
+        for marker, corners in _once(how.upright(jpeg), dictionary, sorted(found), through).items():
             found[marker].append(corners)
     mean = {marker: np.mean(corners, axis=0) for marker, corners in found.items() if 2 * len(corners) > len(jpegs)}
     return MarkerShot((first.shape[1], first.shape[0]), pictures.thumbnail(first, THUMB_PX), mean)
 
 
-def _once(image: pictures.Image, dictionary: str, targets: Sequence[int] | None) -> dict[int, Array]:
+def _once(image: pictures.Image, dictionary: str, targets: Sequence[int] | None, lens: Lens) -> dict[int, Array]:
     seen = [one for one in detect(image, dictionary, targets) if one.whole(image.shape[1], image.shape[0])]
     ids = [one.marker for one in seen]
-    return {one.marker: np.asarray(one.corners, float) for one in seen if ids.count(one.marker) == 1}
+    once = [one for one in seen if ids.count(one.marker) == 1]
+    return {one.marker: straight(one.corners, lens, by_code=one.by_code) for one in once}

@@ -110,11 +110,9 @@ def _decoded(task: Task) -> Picture | Away:
 
 def _in_each(one: Still, numbers: Sequence[int]) -> list[tuple[int, Detection]]:
     """The marker as it is in each of the frames that agree."""
-    found = one.detection
     if len(numbers) == 1:
-        return [(numbers[0], found)]
-    agreeing = zip(one.frames, one.corners, strict=True)
-    return [(numbers[index], Detection(found.marker, corners, found.confidence)) for index, corners in agreeing]
+        return [(numbers[0], one.detection)]
+    return [(numbers[index], seen) for index, seen in zip(one.frames, one.each, strict=True)]
 
 
 def _analysed(task: Task, image: Picture | Away, found: Sequence[Detection], *, draw: bool) -> Analysed:
