@@ -52,14 +52,15 @@ SEARCHERS = 2  # threads: the picture itself has about as many outlines as all s
 class Detection:
     """A marker in a picture: `corners` (4, 2) in pixels, clockwise from the marker's own top-left.
 
-    Pixel centres are whole numbers. `confidence` is the correlation of the cells with the code, 0..1. `by_code`: the
-    corners are those of the whole code as it lies in the picture (`fit`); else of lines along its sides (`corners`).
+    Pixel centres are whole numbers. `confidence` is the correlation of the cells with the code, 0..1. The corners
+    are those of the whole code as it lies in the picture (`fit`), and `sides` (4, 2) are where lines along its sides
+    cross (`corners`); where the code does not tell, the corners are those, and `sides` is None.
     """
 
     marker: int
     corners: Array
     confidence: float
-    by_code: bool = False
+    sides: Array | None = None
 
     def whole(self, width: int, height: int) -> bool:
         """Whether all of it is in the picture: a corner beyond was told by what is seen of its sides, or not at all."""
@@ -254,7 +255,7 @@ class _Search:
         grey = self.looks[0].grey
         whole = by_sides.whole(*grey.shape[::-1])
         corners = fit(grey, by_sides.corners, codes.cells(self.dictionary, one.marker)) if whole else None
-        return by_sides if corners is None else replace(by_sides, corners=corners, by_code=True)
+        return by_sides if corners is None else replace(by_sides, corners=corners, sides=by_sides.corners)
 
     def _exact(self, one: _Candidate) -> Array:
         """The corners that its sides have in the finest picture in which they can be told."""

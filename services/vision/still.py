@@ -79,14 +79,14 @@ def _again(found: Detection, frames: Sequence[Picture], chosen: Sequence[int], d
 
 def _in_one(found: Detection, frame: Picture, dictionary: str) -> Detection | None:
     """The marker as it is in one frame; None where that shows something else."""
-    book, corners = codes.book(dictionary), None
-    if found.by_code:
-        corners = fit(frame, found.corners, codes.cells(dictionary, found.marker))
-    by_code = corners is not None
-    if corners is None:
-        corners = refine_many(frame, found.corners[None], book.modules)[0]
-    if np.isnan(corners).any():
+    book = codes.book(dictionary)
+    by_sides = refine_many(frame, found.corners[None], book.modules)
+    if np.isnan(by_sides).any():
         return None
-    cells = reading.cells(frame, corners[None], book.modules)
-    agrees = reading.fits(cells.inner, book.seen[1][found.marker][None])[0, 0] >= AGREEING
-    return replace(found, corners=corners, by_code=by_code) if agrees else None
+    cells = reading.cells(frame, by_sides, book.modules)
+    if reading.fits(cells.inner, book.seen[1][found.marker][None])[0, 0] < AGREEING:
+        return None
+    by_code = fit(frame, found.corners, codes.cells(dictionary, found.marker)) if found.sides is not None else None
+    if by_code is None:
+        return replace(found, corners=by_sides[0], sides=None)
+    return replace(found, corners=by_code, sides=by_sides[0])

@@ -30,6 +30,7 @@ SAME_PLACE_M, SAME_PLACE_DEG = 0.005, 0.2  # readings that differ by less are on
 SAME_FOCAL = 1e-3  # share; a zoom measured anew in each frame is the same zoom
 STAYED_PX, STAYED_SIDES = 1.0, 0.03  # corners of one place that are farther apart are not of one marker at rest
 COARSER = 2.0  # times; corners that are so much coarser add nothing to the others of a place
+BENT_PX = 0.15  # that a lens bends a code by, as it is laid over
 HUBER = 1.5  # standard deviations of a frame from where it weighs less
 WEIGHINGS = 5
 
@@ -42,7 +43,7 @@ class View:
     which turn about `axes` (2, 3) in the apartment; None: about any. `focal_doubt` is the standard deviation of the
     lens's focal length as a share of it, `aside_deg` that of its axis in any direction. A picture that was `enlarged`,
     or is less exact for another reason, has coarser corners by that factor. All its sides may seem outwards or inwards
-    alike, by `bloom_px`. `by_code`: the corners come from the whole code, not from the sides (`detect.Detection`).
+    alike, by `bloom_px`. `sides`: other ones, as `detect` gives them.
     """
 
     lens: Lens
@@ -56,12 +57,12 @@ class View:
     bloom_px: float = BLOOM_PX
     axes: Array | None = None
     at: float = 0.0
-    by_code: bool = False
+    sides: Array | None = None
 
     @cached_property
     def straight(self) -> Array:
         """The corners, put right for how the lens bends the marker."""
-        return straight(self.corners, self.lens, by_code=self.by_code)
+        return straight(self.corners, self.sides, self.lens)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +105,17 @@ class Sights:
         return Sights(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
-def straight(square: Array, lens: Lens, *, by_code: bool) -> Array:
-    """Corners (4, 2), pixels, of a marker that a lens bends: where they are, from where `detect` has found them."""
-    return (fit.unbent if by_code else corners.unbent)(np.asarray(square, float), lens)
+def straight(square: Array, sides: Array | None, lens: Lens) -> Array:
+    """Corners (4, 2), pixels, of a marker that a lens bends: where they are, from where `detect` has found them.
+
+    How a bent code is laid over is known to a quarter only: where it is bent a lot, its sides tell better.
+    """
+    by_sides = np.asarray(square if sides is None else sides, float)
+    if sides is not None:
+        by_code = fit.unbent(np.asarray(square, float), lens)
+        if float(np.abs(by_code - square).max()) < BENT_PX:
+            return by_code
+    return corners.unbent(by_sides, lens)
 
 
 def by_place(views: Sequence[View]) -> list[list[int]]:

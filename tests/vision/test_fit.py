@@ -9,6 +9,7 @@ from services.vision.corners import refine
 from services.vision.detect import detect
 from services.vision.fit import fit, unbent
 from services.vision.lens import Lens
+from services.vision.views import straight
 from tests.vision.rendering import Print, facing, picture, true_corners
 from tests.vision.test_corners import CAMERA, mean_error, view
 
@@ -116,7 +117,20 @@ def test_what_is_no_square_has_no_answer(square: np.ndarray) -> None:
 def test_a_detection_tells_what_its_corners_come_from() -> None:
     image, truth = view(3, 60)
     (plain,), (shadow,) = (detect(one, "DICT_5X5_1000", {582}) for one in (image, shaded(image, truth)))
-    assert plain.by_code
-    assert not shadow.by_code
+    assert plain.sides is not None
+    assert shadow.sides is None
     assert mean_error(plain.corners, truth) < 0.02
     assert mean_error(shadow.corners, truth) < 0.3
+
+
+@pytest.mark.parametrize(("bend", "limit"), [(-0.02, 0.03), (-0.06, 0.05), (-0.1, 0.06)])
+def test_however_much_a_lens_bends_a_marker_its_corners_are_put_right(bend: float, limit: float) -> None:
+    lens = Lens(320, 240, np.array([[180.0, 0, 40], [0, 180, 30], [0, 0, 1]]), np.array([bend, 0, 0, 0, 0]))
+    off = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        place = np.array([rng.uniform(0.7, 0.9), rng.uniform(0.4, 0.6), 1.0]) * 0.45
+        marker = Print(582, "DICT_5X5_1000", 0.14, facing(rng, place, rng.uniform(0, 30)))
+        (found,) = detect(picture(lens, CAMERA, [marker], rng), "DICT_5X5_1000", {582})
+        off.append(mean_error(straight(found.corners, found.sides, lens), true_corners(lens, CAMERA, marker)))
+    assert np.mean(off) < limit

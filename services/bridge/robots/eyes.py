@@ -69,7 +69,7 @@ def _placed(one: Detection, seen_by: Lens | None, camera: Transform | None, size
     if seen_by is None or camera is None or not one.whole(seen_by.width, seen_by.height):
         return SeenMarker(marker=one.marker)
     try:
-        found = locate([View(seen_by, camera, one.corners, size, by_code=one.by_code)])
+        found = locate([View(seen_by, camera, one.corners, size, sides=one.sides)])
     except ValueError:  # corners that no square explains: it is there, but not where
         return SeenMarker(marker=one.marker)
     return SeenMarker(marker=one.marker, position=_point(found.position), distance=round(found.distance, 3))

@@ -106,4 +106,4 @@ def _once(image: pictures.Image, dictionary: str, targets: Sequence[int] | None,
     seen = [one for one in detect(image, dictionary, targets) if one.whole(image.shape[1], image.shape[0])]
     ids = [one.marker for one in seen]
     once = [one for one in seen if ids.count(one.marker) == 1]
-    return {one.marker: straight(one.corners, lens, by_code=one.by_code) for one in once}
+    return {one.marker: straight(one.corners, one.sides, lens) for one in once}

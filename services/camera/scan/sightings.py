@@ -187,7 +187,7 @@ def _view(eye: Eye, lens: Lens, mount: Mount, sought: Sought, sighting: Sighting
         bloom_px=times * (CUT_OFF_PX if sighting.cut_off else BLOOM_PX),
         axes=axes_in_apartment(mount, reading.pan, reading.tilt),
         at=sighting.at,
-        by_code=sighting.detection.by_code,
+        sides=sighting.detection.sides,
     )
 
 
