@@ -110,10 +110,10 @@ def grid(inner: Rows, size: int) -> NDArray[np.float32]:
 
 
 @lru_cache(maxsize=512)
-def cells(dictionary: str, marker: int) -> NDArray[np.float32]:
-    """A marker as it is printed: 0 dark, 1 light, its border and a cell of paper around, (modules + 2, modules + 2)."""
+def cells(dictionary: str, row: int) -> NDArray[np.float32]:
+    """A row of the book as it is printed, border and a cell of paper included: (modules + 2, modules + 2); 0: dark."""
     known = book(dictionary)
-    return np.asarray(grid(known.codes[marker][None], known.inner)[0], np.float32)
+    return np.asarray(grid(known.codes[row][None], known.inner)[0], np.float32)
 
 
 def _through(codes: Rows, inner: int, kernel: Array | None) -> Rows:
@@ -150,8 +150,7 @@ def _gauss(blur: float) -> Array | None:
 @lru_cache(maxsize=512)
 def faces(dictionary: str, row: int) -> NDArray[np.float32]:
     """How a row of the book looks whole, border included: (sharpnesses, modules * GRAIN, modules * GRAIN), 0 to 1."""
-    known = book(dictionary)
-    fine = _fine(grid(known.codes[row][None], known.inner)[0])
+    fine = _fine(cells(dictionary, row))
     blurred = np.array([cv2.GaussianBlur(fine, (0, 0), sharpness * FINE) for sharpness in SHARPNESS])
     count, step = len(fine) // FINE * GRAIN, FINE // GRAIN
     coarse = blurred.reshape(-1, count, step, count, step).mean(axis=(2, 4))

@@ -33,6 +33,7 @@ FEWEST = 20  # pixels that are compared
 HUBER = 2.5  # standard deviations of a pixel from where it weighs less
 LEAST = 0.03  # of the contrast: in a picture without noise edges would be doubted, which are all that tells
 FARTHEST_PX, FARTHEST_SIDES = 0.8, 0.02  # a corner that walks farther from that of the sides is none, one of them is
+LOST_SIDES = 0.25  # of the shortest side: what has walked so far on the way does not come back
 EXPLAINED = 0.95  # share of what is seen that the code must explain, after both were smoothed
 SCHARR = 32.0  # what OpenCV's slope is multiplied with
 LINES = 8  # of edges across a marker, as far as it matters for how a lens bends it: those of a code of five by five
@@ -55,14 +56,13 @@ def fit(grey: Picture, square: Array, cells: Floats) -> Array | None:
     patch = grey[begin[1] : end[1], begin[0] : end[0]].astype(np.float32)
     if patch.size < FEWEST:
         return None
-    found = _laid_over(
-        _Patch(patch, cells, _root_of_area(square) / modules), _homography(square - begin, modules), side
-    )
-    if found is None:
+    try:
+        found = _laid_over(_Patch(patch, cells, _root_of_area(square) / modules), square - begin)
+    except np.linalg.LinAlgError:  # corners in a line
+        found = None
+    if found is None or np.abs(found + begin - square).max() >= max(FARTHEST_PX, FARTHEST_SIDES * side):
         return None
-    corners = _through(found, UNIT * modules) + begin
-    near = np.abs(corners - square).max() < max(FARTHEST_PX, FARTHEST_SIDES * side)
-    return corners if near else None
+    return np.asarray(found + begin, float)
 
 
 def unbent(square: Array, lens: Lens) -> Array:
@@ -145,10 +145,14 @@ class _Patch:
         return 1.0 - float(smooth[0].var()) / max(float(smooth[1].var()), 1e-9)
 
 
-def _laid_over(patch: _Patch, homography: Array, side: float) -> Array | None:
-    """The homography, from cells to the patch's pixels, at which both agree best; None where they do not."""
-    blur, most = BLUR_PX, min(BLURS_PX[1], max(BLUR_PX, side / patch.modules / 2))
-    square = UNIT * patch.modules
+def _laid_over(patch: _Patch, square: Array) -> Array | None:
+    """The corners, in the patch's pixels, at which both agree best; None where they do not.
+
+    Raises LinAlgError where no code can be laid over.
+    """
+    sides = np.linalg.norm(np.roll(square, -1, axis=0) - square, axis=1)
+    blur, most = BLUR_PX, min(BLURS_PX[1], max(BLUR_PX, float(sides.max()) / patch.modules / 2))
+    homography, corners, far = _homography(square, patch.modules), square, float(sides.min()) * LOST_SIDES
     for _ in range(STEPS):
         rendered = patch.rendered(homography, blur)
         within, cells = patch.compared(homography)
@@ -163,13 +167,15 @@ def _laid_over(patch: _Patch, homography: Array, side: float) -> Array | None:
         slope = np.column_stack((level[1] * slope, light))
         weighed = slope * _weights(residuals, LEAST * abs(float(level[1])))[:, None]
         step = np.linalg.lstsq(weighed.T @ slope, weighed.T @ residuals, rcond=None)[0]
-        before, homography = homography, homography + np.append(step[:8], 0.0).reshape(3, 3)
+        homography = homography + np.append(step[:8], 0.0).reshape(3, 3)
         blur = float(np.clip(blur + step[8], BLURS_PX[0], most))
-        moved = float(np.abs(_through(homography, square) - _through(before, square)).max())
-        if moved < CONVERGED_PX or not moved < side:
+        before, corners = corners, _through(homography, UNIT * patch.modules)
+        if not float(np.abs(corners - square).max()) < far:
+            return None
+        if float(np.abs(corners - before).max()) < CONVERGED_PX:
             break
-    sound = moved < side and level[1] > 0 and patch.explained(within, residuals) > EXPLAINED
-    return homography if sound else None
+    sound = level[1] > 0 and patch.explained(within, residuals) > EXPLAINED
+    return corners if sound else None
 
 
 def _weights(residuals: Array, least: float) -> Array:

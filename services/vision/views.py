@@ -136,7 +136,7 @@ def gather(places: Sequence[Sequence[View]]) -> Sights:
     places = [_clearest(place) for place in places]
     first = [place[0] for place in places]
     averaged = [average(np.array([view.straight for view in p]), p[0].enlarged) for p in places]
-    rays = [v.lens.rays(straight) for v, (straight, _) in zip(first, averaged, strict=True)]
+    rays = [v.lens.rays(square) for v, (square, _) in zip(first, averaged, strict=True)]
     looking = [_mean(np.array([view.camera.rotation for view in place])) for place in places]
     return Sights(
         rays=np.array(rays).reshape(-1, 4, 2),

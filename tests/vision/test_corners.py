@@ -22,6 +22,17 @@ def view(seed: int, side_px: float, **kwargs) -> tuple[np.ndarray, np.ndarray]:
     return picture(LENS, CAMERA, [marker], rng, **kwargs), true_corners(LENS, CAMERA, marker)
 
 
+def aside(
+    lens: Lens, seed: int, depth: float, least: tuple[float, float] = (0.8, 0.5)
+) -> tuple[np.ndarray, np.ndarray]:
+    """A marker far from the lens's axis: the picture and its true corners."""
+    rng = np.random.default_rng(seed)
+    across, down = (rng.uniform(low, low + 0.2) for low in least)
+    place = np.array([across, down, 1.0]) * depth
+    marker = Print(582, "DICT_5X5_1000", 0.14, facing(rng, place, rng.uniform(0, 30)))
+    return picture(lens, CAMERA, [marker], rng), true_corners(lens, CAMERA, marker)
+
+
 def mean_error(found: np.ndarray, truth: np.ndarray) -> float:
     return float(np.linalg.norm(found - truth, axis=-1).mean())
 
@@ -79,10 +90,7 @@ def test_where_the_lens_bends_the_sides_corners_are_put_right() -> None:
     lens = Lens(320, 240, np.array([[180.0, 0, 40], [0, 180, 30], [0, 0, 1]]), np.array([-0.2, 0.03, 0, 0, 0]))
     plain, right = [], []
     for seed in range(10):
-        rng = np.random.default_rng(seed)
-        place = np.array([rng.uniform(0.8, 1.0), rng.uniform(0.5, 0.7), 1.0]) * 0.35
-        marker = Print(582, "DICT_5X5_1000", 0.14, facing(rng, place, rng.uniform(0, 30)))
-        image, truth = picture(lens, CAMERA, [marker], rng), true_corners(lens, CAMERA, marker)
+        image, truth = aside(lens, seed, 0.35)
         found = refine(image, truth, 7)
         assert found is not None
         plain.append(mean_error(found, truth))

@@ -10,10 +10,10 @@ from services.vision.detect import detect
 from services.vision.fit import fit, unbent
 from services.vision.lens import Lens
 from services.vision.views import straight
-from tests.vision.rendering import Print, facing, picture, true_corners
-from tests.vision.test_corners import CAMERA, mean_error, view
+from tests.vision.test_corners import aside, mean_error, view
 
 CELLS = codes.cells("DICT_5X5_1000", 582)
+IN_A_LINE = np.array([[10.0, 50], [40, 50], [70, 50], [40, 50]])
 
 
 def both(image: np.ndarray, truth: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -64,10 +64,7 @@ def test_where_the_lens_bends_a_marker_corners_are_put_right() -> None:
     lens = Lens(320, 240, np.array([[180.0, 0, 40], [0, 180, 30], [0, 0, 1]]), np.array([-0.1, 0.02, 0, 0, 0]))
     plain, right = [], []
     for seed in range(10):
-        rng = np.random.default_rng(seed)
-        place = np.array([rng.uniform(0.8, 1.0), rng.uniform(0.5, 0.7), 1.0]) * 0.45
-        marker = Print(582, "DICT_5X5_1000", 0.14, facing(rng, place, rng.uniform(0, 30)))
-        image, truth = picture(lens, CAMERA, [marker], rng), true_corners(lens, CAMERA, marker)
+        image, truth = aside(lens, seed, 0.45)
         found = both(image, truth, seed)[1]
         plain.append(mean_error(found, truth))
         right.append(mean_error(unbent(found, lens), truth))
@@ -108,7 +105,7 @@ def test_another_code_there_is_no_answer(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "square", [np.full((4, 2), np.nan), np.full((4, 2), 50.0), np.eye(4, 2), 1e4 + 50 * np.eye(4, 2)]
+    "square", [np.full((4, 2), np.nan), np.full((4, 2), 50.0), np.eye(4, 2), 1e4 + 50 * np.eye(4, 2), IN_A_LINE]
 )
 def test_what_is_no_square_has_no_answer(square: np.ndarray) -> None:
     assert fit(view(0, 60)[0], square, CELLS) is None
@@ -128,9 +125,7 @@ def test_however_much_a_lens_bends_a_marker_its_corners_are_put_right(bend: floa
     lens = Lens(320, 240, np.array([[180.0, 0, 40], [0, 180, 30], [0, 0, 1]]), np.array([bend, 0, 0, 0, 0]))
     off = []
     for seed in range(10):
-        rng = np.random.default_rng(seed)
-        place = np.array([rng.uniform(0.7, 0.9), rng.uniform(0.4, 0.6), 1.0]) * 0.45
-        marker = Print(582, "DICT_5X5_1000", 0.14, facing(rng, place, rng.uniform(0, 30)))
-        (found,) = detect(picture(lens, CAMERA, [marker], rng), "DICT_5X5_1000", {582})
-        off.append(mean_error(straight(found.corners, found.sides, lens), true_corners(lens, CAMERA, marker)))
+        image, truth = aside(lens, seed, 0.45, (0.7, 0.4))
+        (found,) = detect(image, "DICT_5X5_1000", {582})
+        off.append(mean_error(straight(found.corners, found.sides, lens), truth))
     assert np.mean(off) < limit

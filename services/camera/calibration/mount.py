@@ -115,16 +115,16 @@ class Touring:
         for _ in range(FRAMES):
             jpeg, now = yield from taken(now)
             jpegs.append(jpeg)
-        how, dictionary, ids, whole = self.how, self.dictionary, sorted(self.known), self.lens
+        how, dictionary, ids, lens = self.how, self.dictionary, sorted(self.known), self.lens
         try:
-            shot, now = yield from study(lambda: markers_in(jpegs, how, dictionary, ids, wanted, whole))
+            shot, now = yield from study(lambda: markers_in(jpegs, how, dictionary, ids, wanted, lens))
         except Away:  # half a picture
             return now
         self.stops.append(Seen(reading, shot))
-        lens = self.lens.scaled(*shot.size)
+        scaled = lens.scaled(*shot.size)
         for marker, corners in shot.markers.items():
             if _inside(corners, shot.size):
-                self.looks.append(Look(marker, corners, lens, reading.pan, reading.tilt))
+                self.looks.append(Look(marker, corners, scaled, reading.pan, reading.tilt))
         return now
 
     def _go(self, pan: float, tilt: float, now: float) -> Plan[tuple[Reading, float]]:
