@@ -152,6 +152,7 @@ def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event,
                 name, Steered(name, service, stopping.set), bus, time.time, Aside(apartment.state / name / "aside")
             )
             _turns(runner, stopping, Clock(), lambda: ready(name, dict(getattr(service, "addresses", {}))))
+            runner.leave()
     finally:
         bus.close()
 

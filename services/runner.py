@@ -30,7 +30,8 @@ Post = Callable[[Message], None]
 class Service(Protocol):
     """What the runner drives. All calls come from one thread; time comes in as `now`, seconds since 1970.
 
-    It may have `counters`, a mapping of texts to numbers, for `service/<service>/info`.
+    It may have `counters`, a mapping of texts to numbers, for `service/<service>/info`, and `leave(now)`, which
+    returns its last words.
     """
 
     subscribes: tuple[str, ...]
@@ -95,6 +96,12 @@ class Runner:
         worked, self._batch = bool(self._batch), []
         self._report(now)
         return worked
+
+    def leave(self) -> None:
+        """The service ends in good order: what it has to say to that."""
+        last_words: Callable[[float], Iterable[Message]] = getattr(self.service, "leave", lambda now: ())
+        for said in last_words(self.clock()):
+            self._publish(said)
 
     def _without_put_aside(self, came: list[Message]) -> list[Message]:
         self.received += len(came)

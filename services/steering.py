@@ -52,6 +52,11 @@ class Steered:
         said = self._inside.tick(now)
         return self._noted(said) if self._log.isEnabledFor(logging.DEBUG) else said
 
+    def leave(self, now: float) -> Iterable[Message]:
+        """See `Service`."""
+        last_words: Callable[[float], Iterable[Message]] = getattr(self._inside, "leave", lambda now: ())
+        return last_words(now)
+
     def _noted(self, said: Iterable[Message]) -> Iterator[Message]:
         """Without what it says: a picture is long, and somebody's business."""
         for message in said:

@@ -7,11 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
+from pydantic_core import from_json
+
 from services import topics
 from services.bus import Message
 from services.camera.orders import Command, canonical
 from services.errors import BadMessage
-from services.payloads import FINAL, OrderResult, OrderState, Position, Who
+from services.payloads import FINAL, LONGEST_ID, Order, OrderResult, OrderState, Position, Who
+
+WHOSE = {"id", "by"}
+MOST_SAID = 200  # bytes of what made no sense
 
 
 @dataclass(eq=False)
@@ -38,21 +43,31 @@ def job(key: str, value: Any, by: Who, order_id: str | None, message: Message) -
 
 
 class Answers:
-    """Says what becomes of orders: on the bus, and to the one who asked by MQTT 5."""
+    """Says what becomes of orders: on the bus, and to the one who asked by MQTT 5.
 
-    def __init__(self, camera: str, publish: Callable[[Message], None], where: Callable[[], Position | None]) -> None:
+    `ranges`: where the camera can look, in words, for who asks for something else than numbers.
+    """
+
+    def __init__(
+        self, camera: str, publish: Callable[[Message], None], where: Callable[[], Position | None], ranges: str = ""
+    ) -> None:
         self.camera = camera
         self.publish = publish
         self.where = where
+        self.ranges = ranges
         self.counts = dict.fromkeys(FINAL, 0)
+        self._taken: list[Job] = []  # what has an answer, and not its last one
 
     def tell(self, job: Job, state: OrderState, error: str | None = None, *, clamped: bool = False) -> None:
         """Publishes a step; after the last one nothing more is said about an order."""
         if job.ended:
             return
         job.state = state
+        self._taken = [one for one in self._taken if one is not job]
         if job.ended:
             self.counts[state] += 1
+        else:
+            self._taken.append(job)
         result = OrderResult(
             id=job.id,
             key=job.key,
@@ -68,15 +83,34 @@ class Answers:
         if answer is not None:
             self.publish(answer)
 
+    def leave(self, why: str) -> None:
+        """Nobody sees to any order any longer."""
+        for one in list(self._taken):
+            self.tell(one, "cancelled", why)
+
     def refuse(self, message: Message, error: BadMessage) -> None:
-        """An order that cannot be taken is answered all the same, with its own id where it could be read."""
+        """An order that cannot be taken is answered all the same, with its own id where one can be read."""
         row, levels = topics.find(message.topic)
-        wanted = error.read.payload if isinstance(error, topics.LateCommand) else None
-        if row is topics.CAMERA_ORDER:
-            key, value = canonical(levels["key"]), wanted.value if wanted else ""
-        elif row is topics.CAMERA_POSITION_SET:
-            key, value = "Position", wanted.model_dump(exclude={"id", "by"}, exclude_none=True) if wanted else {}
-        else:
+        if row not in (topics.CAMERA_ORDER, topics.CAMERA_POSITION_SET):
             return
-        refused = job(key, value, wanted.by if wanted else "human", wanted.id if wanted else None, message)
-        self.tell(refused, "refused", str(error))
+        key, why = canonical(levels["key"]) if row is topics.CAMERA_ORDER else "Position", str(error)
+        if isinstance(error, topics.LateCommand):
+            wanted = error.read.payload
+            value = wanted.value if isinstance(wanted, Order) else wanted.model_dump(exclude=WHOSE, exclude_none=True)
+            refused = job(key, value, wanted.by, wanted.id, message)
+        else:
+            by, order_id = _whose(message.payload)
+            refused = job(key, message.payload[:MOST_SAID].decode(errors="replace"), by, order_id, message)
+            why += f"; expected {self.ranges}" if row is topics.CAMERA_POSITION_SET else ""
+        self.tell(refused, "refused", why)
+
+
+def _whose(payload: bytes) -> tuple[Who, str | None]:
+    """Whose order it is, and its id, as far as that can be read in what makes no sense."""
+    try:
+        told = from_json(payload)
+    except ValueError:
+        told = None
+    by, order_id = (told.get("by"), told.get("id")) if isinstance(told, dict) else (None, None)
+    who: Who = by if by in ("mission", "scan") else "human"
+    return who, str(order_id)[:LONGEST_ID] if isinstance(order_id, str | int) else None

@@ -96,14 +96,22 @@ class Bulletin:
         """Publishes what has changed, and the health once a second."""
         self.say(topics.CAMERA_STATUS, self.health.status)
         self._say_position(now)
-        self.say(topics.CAMERA_STREAM, self.video.state if self.video else Stream(rtsp=False, mjpeg=False, url=""))
+        self._say_stream()
         if now >= self.due:
             self.due = now + EVERY_S
             self._reload()
-            self.say(topics.CAMERA_PLACES, self.places.payload)
+            self.say_changed()
             if self.diagnostics:
                 component = f"camera/{self.camera}"
                 self.publish(topics.DIAGNOSTICS.message(self._diagnostic(counters), component=component))
+
+    def say_changed(self) -> None:
+        """What orders change, before they are done."""
+        self._say_stream()
+        self.say(topics.CAMERA_PLACES, self.places.payload)
+
+    def _say_stream(self) -> None:
+        self.say(topics.CAMERA_STREAM, self.video.state if self.video else Stream(rtsp=False, mjpeg=False, url=""))
 
     def _reload(self) -> None:
         """Somebody may have edited the files; a fault is told once, and the old places stay."""

@@ -16,6 +16,7 @@ from services.bus import Message
 from services.camera.requests import Identity
 
 Key = tuple[str, str]  # platform, entity
+ENTITY_TOPICS = (topics.HOMEASSISTANT_ENTITY, topics.HOMEASSISTANT_STATUS)
 BIRTH = "online"  # what Home Assistant says when it has started: it wants to hear everything again
 USABLE = "{{ 'online' if value_json.state in ('online', 'degraded') else 'offline' }}"
 MOTION = "{% if value_json.value == 1 %}ON{% elif value_json.value == 0 %}OFF{% else %}None{% endif %}"

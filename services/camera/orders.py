@@ -18,9 +18,8 @@ from services.payloads import Who
 
 RANKS: dict[Who, int] = {"scan": 0, "mission": 1, "human": 2}
 LONGEST_S = 30.0  # of one Move order: it can be prolonged
-DIRECTIONS = {
-    direction.name.replace("_", "").lower(): direction for direction in Direction if not direction.name.startswith("Z")
-}
+TURNS = {tuple(one.name.lower().split("_")): one for one in Direction if not one.name.startswith("Z")}
+DIRECTIONS = {"".join(words[::way]): one for way in (1, -1) for words, one in TURNS.items()}  # leftup and upleft
 YES, NO = ("true", "on", "1"), ("false", "off", "0")
 
 
@@ -188,7 +187,9 @@ def _move(value: Any) -> Command:
     if direction == "stop" and len(words) == 1:
         return Halt()
     if direction not in DIRECTIONS or len(words) > 3:
-        raise ValueError(f"expected Stop, or {', '.join(DIRECTIONS)} with speed and seconds, got {_text(value)[:80]!r}")
+        raise ValueError(
+            f"expected Stop, or {', '.join(map(''.join, TURNS))} with speed and seconds, got {_text(value)[:80]!r}"
+        )
     speed, seconds = [*words[1:], "4", "1"][0], words[2] if len(words) > 2 else "1"
     return MoveBy(DIRECTIONS[direction], _speed(speed), _seconds(seconds))
 
@@ -227,7 +228,9 @@ def _scan(value: Any) -> Command:
     if (frames := value.get("frames")) not in (None, *range(1, 51)):
         raise ValueError(f"expected 1 to 50 frames, got {str(frames)[:80]!r}")
     told: dict[str, Any] = {
-        k: read(value[k]) for k, read in (("targets", _markers), ("places", _names)) if value.get(k)
+        k: read(value[k])
+        for k, read in (("targets", _markers), ("places", _names))
+        if value.get(k) not in (None, [], "")
     }
     return ScanFor(**told, full=_flag(value.get("full", "off")), frames=frames)
 

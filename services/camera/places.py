@@ -16,7 +16,7 @@ from typing import Any
 
 from services import document
 from services.camera.requests import Reading, Refused
-from services.errors import ConfigError
+from services.errors import ConfigError, DeviceError
 from services.payloads import Place
 from services.payloads import Places as PlacesPayload
 
@@ -126,6 +126,8 @@ class Places:
             if self._fault is not None:
                 raise Refused(f"nothing is saved over a file that cannot be read: {self._fault.faults[0]}")
             yield
+        except OSError as error:
+            raise DeviceError(f"the places cannot be written: {error.strerror}") from error
         finally:
             os.close(folder)  # which ends the lock
 

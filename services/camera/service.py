@@ -21,7 +21,7 @@ from services.camera.capabilities import Abilities
 from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.commands import VideoMode
 from services.camera.device import REPLY, Sender
-from services.camera.discovery import Discovery
+from services.camera.discovery import ENTITY_TOPICS, Discovery
 from services.camera.early import Early
 from services.camera.health import Health
 from services.camera.orders import Command, GotoPlace, LookAt
@@ -43,7 +43,7 @@ from services.errors import BadMessage
 from services.payloads import Order, OrderState, PositionSet, ScanResult
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
-BROKER_LOST = "the connection to the broker was lost"
+BROKER_LOST, ENDS = "the connection to the broker was lost", "the service ends"
 FREE = WITHOUT_CAMERA | orders.Halt | orders.EndScan  # can be done while the camera is away,
 IN_TURN = orders.Broadcast | orders.EndScan  # these not before what came earlier
 TOPICS = (
@@ -51,8 +51,7 @@ TOPICS = (
     topics.CAMERA_POSITION_SET,
     topics.CAMERA_SNAPSHOT_GET,
     topics.CAMERA_MARKER,
-    topics.HOMEASSISTANT_ENTITY,
-    topics.HOMEASSISTANT_STATUS,
+    *ENTITY_TOPICS,
 )
 
 
@@ -83,7 +82,7 @@ class CameraService:
         self.bulletin = Bulletin(config.name, self.health, self.places, publish)
         self.bulletin.diagnostics = config.diagnostics
         self.discovery = Discovery(config.name, publish, on=config.discovery)
-        self.answers = Answers(config.name, publish, self.bulletin.position)
+        self.answers = Answers(config.name, publish, self.bulletin.position, config.limits.words)
         self.early = Early(self.answers)
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
@@ -147,8 +146,7 @@ class CameraService:
         if motion is not None:
             self.bulletin.say(topics.CAMERA_MOTION, motion)
             self._begin(self.feed.at_motion(motion.value), now)
-        self.bulletin.facts.values["alarm"] = self.motion.fact
-        self.bulletin.facts.complain("alarm", f"motion alarm {self.motion.fact}" if self.motion.trouble else "")
+        self.motion.tell(self.bulletin.facts)
         if self.abilities.present is not None:
             self.bulletin.facts.values["can"] = self.abilities.present.words
         self.bulletin.facts.values["request_queue"] = str(len(self.stage.asked))
@@ -159,6 +157,13 @@ class CameraService:
     def _begin(self, plan: Plan[None], now: float) -> None:
         """A plan whose end nobody waits for."""
         self.stage.begin(plan, now, _nobody)
+
+    def leave(self, now: float) -> Iterable[Message]:
+        """The last words: what was ordered is not done any more, and what turns is stopped."""
+        self.motors.give_up(ENDS, now)
+        self.early.call_off(ENDS)
+        self.answers.leave(ENDS)
+        return self._flush()
 
     def close(self) -> None:
         """Ends the processes of a scan that is under way."""
@@ -177,17 +182,13 @@ class CameraService:
         if isinstance(reply.result, Reading):
             self.bulletin.take(reply.result, reply.received)
         elif isinstance(reply.result, Picture):
-            self._take_picture(reply.result)
+            old, self.scanner.picture = self.scanner.picture, reply.result
+            self.feed.turned(reply.result)
+            self.trips.see(reply.result, old)
         elif isinstance(reply.result, Identity):
             self.bulletin.identity = reply.result
             self.trips.meet(reply.result)
         self.stage.reply(reply, now)
-
-    def _take_picture(self, picture: Picture) -> None:
-        """The motors and the streams follow the picture."""
-        old, self.scanner.picture = self.scanner.picture, picture
-        self.feed.turned(picture)
-        self.trips.see(picture, old)
 
     def _poll(self, now: float) -> Plan[None]:
         """Asks where the camera looks while nobody else does, and who it is after it was away."""
@@ -218,7 +219,7 @@ class CameraService:
         payload = read.payload
         if read.topic is topics.CAMERA_SNAPSHOT_GET:
             self.stage.begin(self.feed.published(), now, _nobody)
-        elif read.topic in (topics.HOMEASSISTANT_ENTITY, topics.HOMEASSISTANT_STATUS):
+        elif read.topic in ENTITY_TOPICS:
             self.discovery.hear(read)
         elif isinstance(payload, ScanResult):
             self.scanner.remember(payload)  # also of another life of this service
@@ -261,6 +262,7 @@ class CameraService:
             self.stage.begin(self.chores.plan(command, now), now, lambda run, now: self._chore_ended(job, run))
 
     def _chore_ended(self, job: Job, run: Run) -> None:
+        self.bulletin.say_changed()
         if run.error is None:
             self.answers.tell(job, "done")
         else:

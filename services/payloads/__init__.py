@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, RootModel, fi
 OrderState = Literal["accepted", "running", "done", "failed", "refused", "cancelled"]
 FINAL: tuple[OrderState, ...] = ("done", "failed", "refused", "cancelled")  # an order has one of them once
 Who = Literal["human", "mission", "scan"]
+LONGEST_ID = 64  # of an order
 LARGEST = 1e300  # so that whoever takes a number may make a float of it
 
 
@@ -86,7 +87,7 @@ class Order(Payload):
     """
 
     value: Free = ""
-    id: str | None = Field(default=None, max_length=64)
+    id: str | None = Field(default=None, max_length=LONGEST_ID)
     by: Who = "human"
 
     @model_validator(mode="before")
@@ -113,7 +114,7 @@ class PositionSet(Payload):
     pan: Real | None = None
     tilt: Real | None = None
     zoom: Real | None = None
-    id: str | None = Field(default=None, max_length=64)
+    id: str | None = Field(default=None, max_length=LONGEST_ID)
     by: Who = "human"
 
     @model_validator(mode="after")

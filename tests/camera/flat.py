@@ -51,6 +51,7 @@ class VirtualCamera:
         self.clock = clock
         self.picture = Picture(True, motors.mirror, "color")
         self.away: DeviceError | None = None
+        self.blind = False  # it gives no pictures
         self.errands: list[Errand] = []
         self.answers: dict[type[Errand], Callable[[Any], object]] = {}
         self.waiting: list[tuple[Request, int]] = []
@@ -95,6 +96,8 @@ class VirtualCamera:
         if self.away is not None:
             return None, self.away
         match request:
+            case Snapshot() if self.blind:
+                return None, Refused("no picture")
             case Snapshot():
                 return json.dumps([self.motors.reading().pan, self.motors.tilt]).encode(), None
             case GetPicture():

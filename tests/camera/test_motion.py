@@ -206,6 +206,7 @@ def test_an_alarm_that_is_switched_off_says_so_and_asks_nothing() -> None:
     room = Room(on=False)
     room.run(20)
     assert (room.values, room.asked, room.watch.fact, room.watch.trouble) == ([-1], [], "off", False)
+    assert room.watch.tick(50.0, turning=False) == room.watch.tick(60.0, turning=False)
 
 
 def test_a_plan_that_ended_is_forgotten() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from services.camera.places import MOST, Places, name_of
 from services.camera.requests import Reading, Refused
-from services.errors import ConfigError
+from services.errors import ConfigError, DeviceError
 from services.payloads import Place
 
 
@@ -28,6 +28,18 @@ def test_the_reports_files_are_read_and_written_as_they_are(tmp_path: Path) -> N
     assert Places(tmp_path).named == places.named
     assert "Kitchen: [41.1, 34.5, 0.0]" in (tmp_path / "preset_position.yaml").read_text()
     assert "'Sofa: left': 1" in (tmp_path / "preset_coords.yaml").read_text()
+
+
+def test_a_folder_that_cannot_be_written_is_told_and_changes_nothing(tmp_path: Path) -> None:
+    places = Places(tmp_path)
+    places.save("One", Place(pan=1.0, tilt=2.0))
+    (tmp_path / "preset_position.yaml").unlink()
+    (tmp_path / "preset_position.yaml").mkdir()
+    (tmp_path / "preset_position.yaml" / "in the way").touch()
+    places._read_at = places._state()
+    with pytest.raises(DeviceError, match="cannot be written"):
+        places.save("Two", Place(pan=1.0, tilt=2.0))
+    assert list(places.named) == ["One"]
 
 
 def test_a_folder_without_files_has_no_places(tmp_path: Path) -> None:

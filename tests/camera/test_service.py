@@ -150,6 +150,12 @@ def test_keys_and_place_names_are_matched_without_regard_to_case(flat: Flat) -> 
         ("order/Goto", b"\xff\xfe", {}, "Goto", None, "UTF-8"),
         ("position/set", b'{"pan": 10, "id": "p"}', {"retain": True}, "Position", "p", "a retained command"),
         ("position/set", b"{}", {}, "Position", None, "at least one"),
+        ("position/set", b'{"pan": "far", "id": "x"}', {}, "Position", "x", "tilt -10 to 108"),
+        ("position/set", b'{"pan": NaN, "id": 7}', {}, "Position", "7", "pan 0 to 360"),
+        ("order/Goto", b'{"value": 1e999, "id": "inf", "by": "mission"}', {}, "Goto", "inf", "finite"),
+        ("order/Goto", b'{"value": "Kitchen", "by": "cat", "id": "c"}', {}, "Goto", "c", "by"),
+        ("order/Goto", b'{"id": {"id": 1}, "value": 1}', {}, "Goto", None, "id"),
+        ("order/Goto", b'{"a":' * 9999, {}, "Goto", None, "Invalid JSON"),
     ],
 )
 def test_an_order_that_is_late_or_makes_no_sense_is_refused_with_an_answer(
@@ -224,6 +230,15 @@ def test_a_position_out_of_range_is_refused_naming_the_range(flat: Flat) -> None
     assert "-10 to 108" in flat.last()["error"]
 
 
+@pytest.mark.parametrize("word", ["LeftUp", "UpLeft", "left-up", "up_left"])
+def test_a_diagonal_may_be_named_either_way_round(flat: Flat, word: str) -> None:
+    flat.order("Move", f"{word} 3 0.5")
+    flat.until(flat.ended)
+    assert flat.states() == LIFE
+    (start,) = (request for request in flat.motors.sent if isinstance(request, Start))
+    assert start.direction is Direction.LEFT_UP
+
+
 def test_a_move_ends_by_itself(flat: Flat) -> None:
     flat.order("Move", "Left 3 0.5")
     flat.until(flat.ended)
@@ -241,6 +256,35 @@ def test_the_same_move_again_prolongs_it(flat: Flat) -> None:
     assert (flat.states("a"), flat.states("b")) == (LIFE, LIFE)
     assert sum(isinstance(request, Start) for request in flat.motors.sent) == 1
     assert abs(flat.reading.pan - 90) > 8.5
+
+
+def test_the_same_move_while_it_is_being_stopped_begins_again(flat: Flat) -> None:
+    flat.order("Move", "Left 3 0.5", order_id="a")
+    flat.until(flat.started)
+    flat.until(lambda: flat.motors.running is None)
+    between = flat.reading.pan
+    assert not flat.ended("a")
+    flat.order("Move", "Left 3 0.5", order_id="b")
+    flat.until(lambda: flat.ended("a") and flat.ended("b"))
+    assert (flat.states("a"), flat.states("b")) == (LIFE, LIFE)
+    assert sum(isinstance(request, Start) for request in flat.motors.sent) == 2
+    assert abs(flat.reading.pan - between) > 3
+    assert flat.motors.running is None
+
+
+def test_an_order_that_waits_for_a_stop_for_too_long_is_refused(flat: Flat) -> None:
+    flat.order("Goto", "Door", order_id="a")
+    flat.until(lambda: flat.motors.running is not None)
+    flat.camera.away = Away("timeout")
+    flat.order("Goto", "Kitchen", order_id="b")
+    flat.until(lambda: flat.ended("b"))
+    assert flat.states("b") == ["accepted", "refused"]
+    assert "has not confirmed the stop" in flat.last("b")["error"]
+    flat.camera.away = None
+    flat.motors.sent.clear()
+    flat.run(20)
+    assert not flat.started()
+    assert flat.motors.running is None
 
 
 def test_stop_ends_a_move_within_a_request(flat: Flat) -> None:
@@ -322,6 +366,53 @@ def test_a_scan_that_is_switched_off_stops_the_motors_and_ends_cancelled(flat: F
     assert flat.motors.running is None
     assert (flat.states("a")[-1], flat.states("b")[-1]) == ("cancelled", "done")
     assert flat.payloads("scan/state")[-1]["state"] == "cancelled"
+
+
+def test_a_scan_that_waits_for_a_stop_is_called_off_by_its_end(flat: Flat) -> None:
+    flat.order("Goto", "Door", order_id="a")
+    flat.until(lambda: flat.motors.running is not None)
+    flat.order("Scan", "ON", order_id="b")
+    assert flat.states("b") == ["accepted"]
+    flat.order("Scan", "OFF", order_id="c")
+    flat.until(lambda: flat.ended("b") and flat.ended("c"))
+    flat.run(10)
+    assert (flat.states("b")[-1], flat.states("c")[-1]) == ("cancelled", "done")
+    assert {one["state"] for one in flat.payloads("scan/state")} == {"idle"}
+
+
+def test_what_a_scan_has_found_is_told_although_a_place_was_not_to_be_seen(flat: Flat) -> None:
+    flat.markers[582] = (345.0, 38.0)
+    flat.order("Scan", {"targets": [582, 17], "places": ["Sofa", "Kitchen"]})
+    flat.until(lambda: flat.payloads("scan/state")[-1]["found"] == [582])
+    flat.camera.blind = True
+    flat.until(flat.ended)
+    assert flat.last()["state"] == "failed"
+    assert [one["marker"] for one in flat.payloads("scan/result")] == [582]
+
+
+def test_a_service_that_ends_ends_every_order_and_what_turns(flat: Flat) -> None:
+    flat.order("Scan", "ON", order_id="a")
+    flat.order("Reboot", "True", order_id="b")
+    flat.until(lambda: flat.motors.running is not None)
+    flat.said += flat.service.leave(flat.now)
+    assert [flat.states(one)[-1] for one in "ab"] == ["cancelled", "cancelled"]
+    assert flat.payloads("scan/state")[-1]["state"] == "cancelled"
+    flat.until(lambda: flat.motors.running is None, 2.0)
+
+
+def test_a_reading_a_little_beyond_its_range_is_in_no_orders_way(flat: Flat) -> None:
+    flat.motors.axes[1].at = flat.motors.axes[1].low = -10.2
+    flat.run(3)
+    flat.order("Zoom", "2")
+    flat.until(flat.ended)
+    assert flat.states() == LIFE
+
+
+def test_places_are_told_before_the_order_that_changed_them_is_done(flat: Flat) -> None:
+    flat.order("SaveAs", "Window")
+    flat.until(flat.ended)
+    topics = [one.topic for one in flat.said if one.topic.endswith(("/places", "/order_result"))]
+    assert topics[-2:] == ["camera/ip1/places", "camera/ip1/order_result"]
 
 
 def test_targets_are_set_added_and_removed(flat: Flat) -> None:

@@ -19,6 +19,7 @@ from services.camera.alarm.listener import Heard
 from services.camera.errands import GetMotion
 from services.camera.plan import Plan, attempt
 from services.camera.requests import Event, Reply
+from services.camera.upkeep import Facts
 from services.payloads import Motion, stamp
 
 GRACE_S = 3.0  # a stream that is back so soon was in no trouble
@@ -69,6 +70,11 @@ class MotionWatch:
         """Whether it was said to be in trouble."""
         return self.on and self._said is not None and self._said.value == -1
 
+    def tell(self, facts: Facts) -> None:
+        """Puts how it fares into the diagnostics."""
+        facts.values["alarm"] = self.fact
+        facts.complain("alarm", f"motion alarm {self.fact}" if self.trouble else "")
+
     def take(self, heard: Heard) -> None:
         """What the listener posts."""
         if heard.events:
@@ -92,7 +98,8 @@ class MotionWatch:
         if turning:
             self._turned_at = now
         if not self.on:
-            return Motion(value=-1, since=stamp(now)) if self._said is None else self._said
+            self._said = self._said or Motion(value=-1, since=stamp(now))
+            return self._said
         if self._trouble_at is None and not self._attached and not self._mute:
             self._trouble_at = now + UNKNOWN_S
         if not self._asking and self._wants_to_ask(now):

@@ -48,13 +48,26 @@ class Limits:
         """From where to where each axis can go, pan unwrapped."""
         return (self.dead_arc[1] - 360, self.dead_arc[0]), self.tilt, self.zoom
 
+    def within(self, reading: Reading) -> Pose:
+        """A reading as one that lies within the ranges."""
+        told = reading.pan % 360, reading.tilt, reading.zoom
+        pan, tilt, zoom = (
+            min(high, max(low, value)) for value, (_, (low, high)) in zip(told, self._may_be, strict=True)
+        )
+        return pan, tilt, zoom
+
+    @property
+    def words(self) -> str:
+        """What a goal may be."""
+        return ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in self._may_be)
+
+    @property
+    def _may_be(self) -> tuple[tuple[str, tuple[float, float]], ...]:
+        return ("pan", (0.0, 360.0)), ("tilt", self.tilt), ("zoom", self.zoom)
+
     def goal(self, pan: float, tilt: float, zoom: float) -> Goal:
         """A goal given as readings; Refused, naming the range, when no camera position answers to it."""
-        for name, value, (low, high) in (
-            ("pan", pan, (0.0, 360.0)),
-            ("tilt", tilt, self.tilt),
-            ("zoom", zoom, self.zoom),
-        ):
+        for value, (name, (low, high)) in zip((pan, tilt, zoom), self._may_be, strict=True):
             if not low <= value <= high:  # also false for what is not a number
                 raise Refused(f"{name} {value:g} is out of range {low:g} to {high:g}")
         wanted = self.unwrap(pan)

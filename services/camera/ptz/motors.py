@@ -19,6 +19,7 @@ from services.camera.ptz.stand import Hold, halt, stop
 from services.camera.requests import Reading, Refused
 from services.camera.scan.wish import ScanFor
 from services.payloads import OrderState
+from services.topic import lateness
 
 STOP_LIMIT_S = 10.0  # a Stop order that is not confirmed by then has failed; the stopping goes on
 
@@ -49,8 +50,8 @@ class Motors:
 
     @property
     def scanning(self) -> bool:
-        """Whether a scan runs."""
-        return bool(self.jobs) and isinstance(self.jobs[0].command, ScanFor)
+        """Whether a scan runs, or is the next."""
+        return any(isinstance(job.command, ScanFor) for job in (*self.jobs[:1], self._next) if job is not None)
 
     def order(self, job: Job, now: float) -> None:
         """Takes an accepted order: it begins, or waits for a stop, or loses."""
@@ -88,7 +89,9 @@ class Motors:
             self._halt(halt(now, every=True), now)
 
     def tick(self, now: float) -> None:
-        """Gives up waiting for a stop that is not confirmed."""
+        """Gives up waiting for a stop that is not confirmed; what was to come after it is too late then."""
+        if self._next is not None and (late := lateness(self._next.message.received, now)):
+            self._call_off_next(f"{late}: the camera has not confirmed the stop before it", "refused")
         for job, limit in list(self._stops):
             if now > limit:
                 self._stops.remove((job, limit))
@@ -100,6 +103,10 @@ class Motors:
             return False
         if not orders.prolongs(command, running) or job.by != self.jobs[0].by:
             return False
+        if self.hold.over:  # it is being stopped: the same again begins when that is done
+            self._call_off_next(f"the {job.by}'s order {job.key} goes first")
+            self._next = job
+            return True
         self.hold.prolong(command.seconds, now)
         self.jobs.append(job)
         self.answers.tell(job, "running")
@@ -130,6 +137,7 @@ class Motors:
             self._halt(stop(now), now)
             return
         self._end("done", None, now, run.result if isinstance(run.result, Arrival) else None)
+        self._begin_next(now)
 
     def _end(self, state: OrderState, error: str | None, now: float, arrival: Arrival | None = None) -> None:
         jobs, self.jobs, self.hold = self.jobs, [], None
@@ -140,14 +148,22 @@ class Motors:
 
     def _cancel(self, why: str, now: float) -> None:
         """Ends what runs or waits, with a stop where there may be motion."""
-        if self._next is not None:
-            waiting, self._next = self._next, None
-            self.answers.tell(waiting, "cancelled", why)
+        self._call_off_next(why)
         if self._run is not None:
             self.stage.drop(self._run)
             self._run = None
             self._halt(stop(now), now)
             self._end("cancelled", why, now)
+
+    def _call_off_next(self, why: str, state: OrderState = "cancelled") -> None:
+        if self._next is not None:
+            waiting, self._next = self._next, None
+            self.answers.tell(waiting, state, why)
+
+    def _begin_next(self, now: float) -> None:
+        if self._next is not None:
+            job, self._next = self._next, None
+            self._begin(job, now)
 
     def _halt(self, plan: Plan[Any], now: float) -> None:
         run = self.stage.begin(plan, now, self._halted)
@@ -158,6 +174,4 @@ class Motors:
         stops, self._stops = self._stops, []
         for job, _ in stops:
             self.answers.tell(job, "done")
-        if self._next is not None:
-            job, self._next = self._next, None
-            self._begin(job, now)
+        self._begin_next(now)

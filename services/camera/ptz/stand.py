@@ -81,7 +81,7 @@ def halt(now: float, *, every: bool = False) -> Plan[Reading]:
 
 
 class Hold:
-    """A motion by hand for some seconds from the moment that it is confirmed; the end can be put off while it runs."""
+    """A motion by hand for some seconds from its confirmation; until it is `over` its end can be put off."""
 
     def __init__(self, direction: Direction, speed: int, seconds: float, skill: Skill | None = None) -> None:
         self.direction = direction
@@ -89,6 +89,7 @@ class Hold:
         self.speed = speed
         self.seconds = seconds
         self.until: float | None = None
+        self.over = False
 
     def prolong(self, seconds: float, now: float) -> None:
         """Lets it run for so long from now."""
@@ -111,6 +112,7 @@ class Hold:
             if self.until - now > 1.0:
                 now = (yield from ask(Status())).received
             now = yield from wait(min(self.until, now + 0.4))
+        self.over = True
         yield from stop(now)
         reading, _ = yield from settle()
         return reading

@@ -43,10 +43,12 @@ class Trips:
         if isinstance(command, GotoPlace):
             place = self.places.get(command.place)
             return self.config.limits.goal(place.pan, place.tilt, place.zoom)
-        pan = here.pan if command.pan is None else command.pan
-        tilt = here.tilt if command.tilt is None else command.tilt
-        zoom = here.zoom if command.zoom is None else command.zoom
-        return self.config.limits.goal(pan, tilt, zoom)
+        pan, tilt, zoom = self.config.limits.within(here)  # at a stop it may read a little more than its range
+        return self.config.limits.goal(
+            pan if command.pan is None else command.pan,
+            tilt if command.tilt is None else command.tilt,
+            zoom if command.zoom is None else command.zoom,
+        )
 
     def plan(self, command: GotoPlace | LookAt, now: float) -> Plan[Arrival]:
         """The move; what it taught is kept."""

@@ -135,7 +135,7 @@ class Scanner:
             self._say(self.scan.state("running", now))
 
     def ended(self, state: OrderState, error: str | None, now: float) -> None:
-        """The order of the scan has ended: results, when it was done."""
+        """The order of the scan has ended: results, unless it was cancelled."""
         scan = self.scan
         self.close()
         if scan is None:
@@ -145,7 +145,7 @@ class Scanner:
         give_back()
         if self.modes.changed:
             self.begin(self.restored(), now)
-        if state == "done":
+        if state != "cancelled":
             self._results(scan)
         last: Literal["done", "cancelled", "failed"] = (
             "done" if state == "done" else "cancelled" if state == "cancelled" else "failed"
@@ -226,7 +226,7 @@ class Scanner:
         for marker, seen in sorted(scan.findings.seen.items()):
             sought = Sought(marker, self.config.markers.of(marker), self.config.markers.prior(marker))
             results = sightings.results(self.eye, sought, seen, scan.name, scan.findings.mode_of(marker))
-            for result in results:
+            for result in reversed(results):  # so that the newest is the last
                 self._publish(topics.CAMERA_SCAN_RESULT.message(result, cam=self.config.name))
             self._publish(topics.CAMERA_MARKER.message(results[0], cam=self.config.name, marker=marker))
             self.remember(results[0])
