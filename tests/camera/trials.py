@@ -89,6 +89,20 @@ def kill_service(flat: SmallFlat, *, camera: str = "ip1") -> float:
     return seconds
 
 
+def end_service(flat: SmallFlat, *, camera: str = "ip1") -> float:
+    """SIGTERM for the service in the middle of a move; seconds until the motor stands still. Its order has an end."""
+    door, service = flat.doors[camera], flat.pid(f"camera-{camera}")
+    with flat.client(f"service/camera-{camera}/status", f"camera/{camera}/#") as bus:
+        turn(bus, flat, camera)
+        os.kill(service, signal.SIGTERM)
+        seconds = until_still(door)
+        ended = bus.payload(f"camera/{camera}/order_result", lambda result: result.final, 10.0)
+        assert (ended.key, ended.state, ended.error) == ("Move", "cancelled", "the service ends")
+        bus.payload(f"service/camera-{camera}/status", lambda text: text == "offline", 10.0)
+    flat.start_services()
+    return seconds
+
+
 def kill_supervisor(flat: SmallFlat, *, camera: str = "ip1") -> float:
     """kill -9 of the supervisor in the middle of a move; seconds until the motor stands still. Nobody is left over."""
     door, family = flat.doors[camera], flat.processes
