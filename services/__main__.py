@@ -15,7 +15,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from services import access, client, process, secret_store, topics
+from services import access, process, secret_store
 from services.command_line import (
     backup,
     bench,
@@ -26,6 +26,7 @@ from services.command_line import (
     install,
     mission,
     openhab,
+    order,
     record,
     replay,
     scan,
@@ -35,10 +36,9 @@ from services.command_line import (
     stored,
     watch,
 )
-from services.command_line.options import CONFIG, SERVICES, Camera, Config, Json, out
+from services.command_line.options import CONFIG, SERVICES, Config, Json, out
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
-from services.payloads import OrderResult
 from services.supervisor import Supervisor, commands, processes, simulated
 from services.topics import asyncapi, page
 
@@ -125,19 +125,6 @@ def topics_(
         _say(page.markdown())
 
 
-@app.command(epilog="Example: apartment order ip1 Goto Kitchen")
-def order(
-    camera: Camera,
-    key: Annotated[str, typer.Argument(autocompletion=completion.order_keys)],
-    value: Annotated[str, typer.Argument()] = "",
-    config: Config = CONFIG,
-    json: Json = False,
-) -> None:
-    """Give a camera an order and wait until it is done."""
-    with client.connected(load(config).bus, (topics.CAMERA_ORDER_RESULT.filter,)) as bus:
-        _ended(bus.order(camera, key, value, tell=None if json else _tell_order), json)
-
-
 @app.command(epilog="Example: apartment probe ip1 --url http://192.0.2.9 --user ros")
 def probe(
     camera: Annotated[str, typer.Argument(help="A camera of the configuration, or with --url a name for a new one.")],
@@ -165,6 +152,7 @@ def probe(
     command.run(out, target, out_folder or Path(f"probe-{camera}"), yes_move=yes_move, json_only=json)
 
 
+app.command(epilog="Example: apartment order ip1 Goto Kitchen")(order.order)
 app.command(epilog="Example: apartment scan ip1 --target 582")(scan.scan)
 stored.add_to(app)
 app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
@@ -196,17 +184,6 @@ def _names(apartment: Apartment, wanted: list[str] | None) -> list[str]:
 
 def _say(text: str) -> None:
     print(text, flush=True)
-
-
-def _tell_order(result: OrderResult) -> None:
-    out.print(f"{result.key}: {result.state}{f' ({result.error})' if result.error else ''}")
-
-
-def _ended(result: OrderResult, json: bool) -> None:
-    if json:
-        out.print_json(result.model_dump_json())
-    if result.state != "done":
-        raise typer.Exit(1)
 
 
 def main() -> None:

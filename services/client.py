@@ -5,6 +5,7 @@ Not here: a service's life (`process.py`). Used by the command line, the demo an
 
 from __future__ import annotations
 
+import math
 import os
 import time
 import uuid
@@ -17,20 +18,31 @@ from services.bus.mqtt import MqttBus
 from services.config import BusSettings
 from services.payloads import Order, OrderResult
 from services.process import address
-from services.topics import CAMERA_ORDER, CAMERA_ORDER_RESULT, read
+from services.topics import CAMERA_ORDER, CAMERA_ORDER_RESULT, SERVICE_STATUS, read
+
+ANSWER_S = 10.0  # an order that is handled after 5 s is refused, so it is answered by then if anybody is there
 
 
 class Client:
     """Waits on a bus from the caller's thread. What came while it waited for something else is kept in `seen`."""
 
-    def __init__(self, bus: Bus, came: Sequence[Message] = ()) -> None:
-        """`came`: what has come already; the first `pump` gives it."""
+    def __init__(
+        self,
+        bus: Bus,
+        came: Sequence[Message] = (),
+        filters: Sequence[str] = (),
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """`came`: what has come already, by `filters`, which are subscribed to; the first `pump` gives it."""
         self.bus = bus
         self.seen: list[Message] = []
         self._came = list(came)
+        self._filters = list(filters)
+        self._clock = clock
 
     def subscribe(self, *filters: str) -> None:
         """Asks for everything that matches any of the filters."""
+        self._filters.extend(filters)
         self.bus.subscribe(filters)
 
     def publish(self, message: Message) -> None:
@@ -81,32 +93,71 @@ class Client:
         self.pump()
         self.seen.clear()
 
-    def give(self, camera: str, key: str, value: Any = "") -> str:
-        """Gives a camera an order; the id that its answers carry."""
-        name = uuid.uuid4().hex[:12]
-        self.publish(CAMERA_ORDER.message(Order(value=value, id=name), cam=camera, key=key))
-        return name
-
     def order(
         self,
         camera: str,
         key: str,
         value: Any = "",
-        timeout_s: float = 60.0,
+        timeout_s: float = math.inf,
         tell: Callable[[OrderResult], None] | None = None,
+        hear: Callable[[Any], None] | None = None,
     ) -> OrderResult:
-        """Gives a camera an order and waits for the answer that ends it; TimeoutError when none comes."""
-        given = self.give(camera, key, value)
+        """Gives a camera an order and waits for the answer that ends it, as long as that takes.
 
-        def ours(result: OrderResult) -> bool:
-            if result.id != given:
-                return False
-            if tell is not None:
-                tell(result)
-            return result.final
+        `tell` is given each of its answers, `hear` what else of that camera comes meanwhile. TimeoutError when nobody
+        answers within ANSWER_S, or nothing more comes after the camera's service or the broker was away.
+        """
+        order = Order(value=value, id=uuid.uuid4().hex[:12])
+        given, connections = _Given(order.id, camera, self._clock()), self.bus.connections
+        end = self._clock() + timeout_s
+        self._hear(given.answers, given.status)  # before it is given, so nothing is missed
+        self.publish(CAMERA_ORDER.message(order, cam=camera, key=key))
+        while (now := self._clock()) < min(end, given.until):
+            for message in self.pump(0.05):
+                result = given.take(message, now)
+                if result is not None and tell is not None:
+                    tell(result)
+                if result is not None and result.final:
+                    return result
+                if hear is not None and message.topic.startswith(f"camera/{camera}/"):
+                    hear(read(message, message.received).payload)
+            if not self.bus.connected or self.bus.connections != connections:
+                connections = self.bus.connections
+                given.lost(now)
+        raise TimeoutError(f"camera-{camera}: {key} has not ended: {given.state}")
 
-        result: OrderResult = self.payload(CAMERA_ORDER_RESULT.name(cam=camera), ours, timeout_s)
+    def _hear(self, *topics: str) -> None:
+        """Subscribes to those that no filter of ours matches yet."""
+        if missing := [one for one in topics if not any(topic_matches(known, one) for known in self._filters)]:
+            self.subscribe(*missing)
+
+
+class _Given:
+    """An order that was given: what its answers say, and until when the next one has to come."""
+
+    def __init__(self, order_id: str | None, camera: str, now: float) -> None:
+        self.answers = CAMERA_ORDER_RESULT.name(cam=camera)
+        self.status = SERVICE_STATUS.name(service=f"camera-{camera}")
+        self.until = now + ANSWER_S
+        self.state = f"no answer within {ANSWER_S:.0f} s"
+        self._id = order_id
+
+    def take(self, message: Message, now: float) -> OrderResult | None:
+        """The answer that the message is, if it is one to this order."""
+        if message.topic == self.status and message.payload == b"offline":
+            self.lost(now)
+        if message.topic != self.answers:
+            return None
+        result: OrderResult = read(message, message.received).payload
+        if result.id != self._id:
+            return None
+        self.until, self.state = math.inf, f"it is {result.state}"
         return result
+
+    def lost(self, now: float) -> None:
+        """Who carries it out, or the broker, was away: it may be forgotten, and its end may have been missed."""
+        if self.until == math.inf:
+            self.until, self.state = now + ANSWER_S, f"{self.state}, but its service or the broker was away"
 
 
 @contextmanager
@@ -123,6 +174,6 @@ def connected(
             if time.monotonic() > end:
                 raise TimeoutError(f"no broker answers at {settings.host}:{settings.port}")
             waiting += bus.receive(0.05)
-        yield Client(bus, waiting)
+        yield Client(bus, waiting, filters)
     finally:
         bus.close()

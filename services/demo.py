@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -19,9 +18,9 @@ from rich.table import Table
 
 from services import client, persistence, topics
 from services.client import Client
-from services.command_line.scan import progress
+from services.command_line.scan import ordered, progress
 from services.config import Apartment
-from services.payloads import Order, OrderResult, ScanResult, ScanState
+from services.payloads import ScanResult
 from services.process import ready_line
 from services.simulated import Parts, Simulated, parts_of, services_of
 from services.simulators.world import World
@@ -97,29 +96,14 @@ def _home_lives(out: Console, bus: Client) -> None:
 def _scan(out: Console, bus: Client, camera: str) -> ScanResult | None:
     out.print(f"The camera {camera} looks for marker {TARGET} ...")
     with progress(out) as advance:
-        end = _order_scan(bus, camera, advance)
+        end = ordered(bus, camera, "ON", advance, SCAN_S)
     found = [
         topics.read(message, message.received).payload for message in bus.seen if message.topic.endswith("/scan/result")
     ]
     result = next((one for one in found if one.marker == TARGET), None)
     if result is None:
-        out.print(f"Marker {TARGET} was not found: {end}", style="bold red")
+        out.print(f"Marker {TARGET} was not found: {end.error or end.state}", style="bold red")
     return result
-
-
-def _order_scan(bus: Client, camera: str, advance: Callable[[ScanState], None]) -> str:
-    """Waits for the scan's end and shows each of its states meanwhile."""
-    order = Order(value="ON", id=f"demo-{time.time():.0f}")
-    bus.publish(topics.CAMERA_ORDER.message(order, cam=camera, key="Scan"))
-    end = time.monotonic() + SCAN_S
-    while time.monotonic() < end:
-        for message in bus.pump(0.2):
-            payload = topics.read(message, message.received).payload
-            if isinstance(payload, ScanState):
-                advance(payload)
-            if isinstance(payload, OrderResult) and payload.id == order.id and payload.final:
-                return payload.error or payload.state
-    return f"no answer within {SCAN_S:.0f} s"
 
 
 def _judge(out: Console, result: ScanResult, world: World) -> bool:

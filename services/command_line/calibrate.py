@@ -7,7 +7,6 @@ configuration. How it is learnt is in `services/camera/calibration/` and `servic
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from time import time
 from typing import Annotated, Any
@@ -23,17 +22,17 @@ from services.client import Client
 from services.command_line import prints
 from services.command_line.calibrate_map import map_
 from services.command_line.options import CONFIG, Camera, Config, YesMove, out
+from services.command_line.order import tell, with_camera
 from services.command_line.prints import Book, Inner, Kind, Side, Squares, squares_of
 from services.command_line.zoom import zoom
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.payloads import Calibration, OrderResult
-from services.topics import CAMERA_CALIBRATION, CAMERA_ORDER_RESULT, read
+from services.topics import CAMERA_CALIBRATION
 from services.whole_file import write_whole
 
 app = typer.Typer(no_args_is_help=True, help="Learn on purpose what a device is like.")
 Report = Annotated[Path | None, typer.Option("--out", help="Where the report goes; default <camera>-<what>.html.")]
-MOTORS_S, TOUR_S, SLACK_S = 900.0, 1800.0, 120.0
 BAR, FULL, EMPTY = 30, "#", "."
 ASK = "May {} turn now? It looks for the markers all around, for some minutes, and returns to where it looked."
 
@@ -50,8 +49,8 @@ def ptz(camera: Camera, yes_move: YesMove = False, config: Config = CONFIG) -> N
     apartment = _apartment(config, camera)
 
     def ordered() -> bool:
-        with client.connected(apartment.bus, (CAMERA_ORDER_RESULT.filter,)) as bus:
-            return bus.order(camera, "CalibratePtz", "True", timeout_s=MOTORS_S, tell=_tell).state == "done"
+        with client.connected(apartment.bus) as bus:
+            return bus.order(camera, "CalibratePtz", "True", tell=tell).state == "done"
 
     if not command.run(out, camera, apartment.state, ordered, yes_move=yes_move):
         raise typer.Exit(1)
@@ -76,7 +75,7 @@ def lens(
         "board": board, "columns": columns, "rows": rows, "square_mm": square, "dictionary": dictionary,
         "model": model, "seconds": seconds, **({} if marker is None else {"marker_mm": marker}),
     }  # fmt: skip
-    told = _learnt(apartment, camera, "CalibrateLens", wish, seconds + SLACK_S)
+    told = _learnt(apartment, camera, "CalibrateLens", wish)
     _show(told)
     out.print(f"written to {told.file}; the camera's service uses it from now on")
     _copy(told.report, report or Path(f"{camera}-lens.html"))
@@ -100,7 +99,7 @@ def mount(
     markers = dict(map(_placed, at or []))
     if not _may_move(ASK.format(camera), yes_move=yes_move):
         raise typer.Exit(1)
-    told = _learnt(apartment, camera, "CalibrateMount", {"markers": markers, "doubt_m": doubt_mm / 1000}, TOUR_S)
+    told = _learnt(apartment, camera, "CalibrateMount", {"markers": markers, "doubt_m": doubt_mm / 1000})
     _show(told)
     if told.said:
         out.print(told.said, style="yellow")
@@ -114,10 +113,7 @@ app.command(epilog="Example: apartment calibrate markers 582 17 --side 140 --out
 
 
 def _apartment(config: Path, camera: str) -> Apartment:
-    apartment = load(config, (f"camera-{camera}",))
-    if f"camera-{camera}" not in apartment.instances:
-        raise ConfigError([f"{config}:1: cameras: expected {camera!r} there"])
-    return apartment
+    return with_camera(load(config, (f"camera-{camera}",)), camera)
 
 
 def _placed(text: str) -> tuple[str, list[float]]:
@@ -139,27 +135,23 @@ def _may_move(question: str, *, yes_move: bool) -> bool:
     return Confirm.ask(question, console=out)
 
 
-def _tell(result: OrderResult) -> None:
-    out.print(f"{result.key}: {result.state}{f' ({result.error})' if result.error else ''}")
-
-
-def _learnt(apartment: Apartment, camera: str, key: str, wish: dict[str, Any], timeout_s: float) -> Calibration:
+def _learnt(apartment: Apartment, camera: str, key: str, wish: dict[str, Any]) -> Calibration:
     """Orders it and shows how it goes; what came out. Exit 1 when nothing did."""
-    with client.connected(apartment.bus, (CAMERA_ORDER_RESULT.filter, CAMERA_CALIBRATION.filter)) as bus:
-        result, told = _followed(bus, camera, key, wish, timeout_s)
-    _tell(result)
+    with client.connected(apartment.bus, [CAMERA_CALIBRATION.name(cam=camera)]) as bus:
+        result, told = _followed(bus, camera, key, wish)
+    tell(result)
     if result.state != "done" or told is None:
         raise typer.Exit(1)
     return told
 
 
-def _followed(
-    bus: Client, camera: str, key: str, wish: dict[str, Any], timeout_s: float
-) -> tuple[OrderResult, Calibration | None]:
+def _followed(bus: Client, camera: str, key: str, wish: dict[str, Any]) -> tuple[OrderResult, Calibration | None]:
     last: list[Calibration] = []
     with Live(console=out, auto_refresh=False, transient=True) as live:
 
-        def hear(told: Calibration) -> None:
+        def hear(told: Any) -> None:
+            if not isinstance(told, Calibration):
+                return
             before = last[-1].said if last else ""
             last.append(told)
             if out.is_terminal:
@@ -167,29 +159,8 @@ def _followed(
             elif told.said and told.said != before:
                 out.print(f"{100 * told.progress:3.0f} %  {told.views} pictures: {told.said}")
 
-        result = _ordered(bus, camera, key, wish, timeout_s, hear)
+        result = bus.order(camera, key, wish, hear=hear)
     return result, next((one for one in reversed(last) if one.state == "done"), None)
-
-
-def _ordered(
-    bus: Client, camera: str, key: str, wish: dict[str, Any], timeout_s: float, hear: Callable[[Calibration], None]
-) -> OrderResult:
-    mine = bus.give(camera, key, wish)
-
-    def over(result: Any) -> bool:
-        if isinstance(result, Calibration):
-            hear(result)
-            return False
-        return isinstance(result, OrderResult) and result.id == mine and result.final
-
-    wanted = (CAMERA_CALIBRATION.name(cam=camera), CAMERA_ORDER_RESULT.name(cam=camera))
-    end = bus.until(
-        lambda message: message.topic in wanted and over(read(message, message.received).payload),
-        timeout_s,
-        f"the end of {key}",
-    )
-    result: OrderResult = read(end, end.received).payload
-    return result
 
 
 def _picture(told: Calibration) -> Text:

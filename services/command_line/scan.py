@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from math import sqrt
+from math import inf, sqrt
 from pathlib import Path
 from typing import Annotated
 
@@ -16,15 +16,15 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from services import client, topics
-from services.bus import Message
+from services import client
 from services.client import Client
 from services.command_line import completion
 from services.command_line.options import CONFIG, Camera, Config, Json, out
+from services.command_line.order import with_camera
 from services.config import load
 from services.payloads import OrderResult, ScanResult, ScanState
+from services.topics import read
 
-LONGEST_S = 600.0
 Advance = Callable[[ScanState], None]
 
 
@@ -40,21 +40,19 @@ def scan(
     """Look for markers with a camera; exit 1 when one was not found."""
     from services.command_line import scanned  # it brings OpenCV
 
-    apartment = load(config)
-    if camera not in apartment.cameras:
-        raise typer.BadParameter(f"expected one of {', '.join(apartment.cameras) or 'none'}, got {camera!r}")
-    filters = [row.filter_for(cam=camera) for row in (topics.CAMERA_ORDER_RESULT, *scanned.HEARD)]
+    apartment = with_camera(load(config), camera)
+    filters = [row.filter_for(cam=camera) for row in scanned.HEARD]
     with client.connected(apartment.bus, filters) as bus, progress(out, quiet=json) as advance:
-        end = _ended(bus, camera, {"targets": target, "full": full}, advance)
-        heard = [message for message in bus.seen if not message.topic.endswith("/order_result")]
-    found = {one.payload.marker: one for one in map(_read, heard) if one.topic is topics.CAMERA_SCAN_RESULT}
+        end = ordered(bus, camera, {"targets": target, "full": full}, advance)
+    said = (read(message, message.received).payload for message in bus.seen)
+    found = {one.marker: one for one in said if isinstance(one, ScanResult)}
     if json:
         for one in found.values():
-            out.print_json(one.message.payload.decode())
+            out.print_json(one.model_dump_json())
     else:
-        out.print(table(one.payload for one in found.values()) if found else f"found nothing: {end.error or end.state}")
+        out.print(table(found.values()) if found else f"found nothing: {end.error or end.state}")
     if plot is not None:
-        scanned.plot(apartment, camera, heard, plot, world)
+        scanned.plot(apartment, camera, bus.seen, plot, world)
     if end.state != "done" or not found:
         raise typer.Exit(1)
 
@@ -78,22 +76,14 @@ def progress(screen: Console, *, quiet: bool = False) -> Iterator[Advance]:
         yield advance
 
 
-def _ended(bus: Client, camera: str, wish: dict[str, object], advance: Advance) -> OrderResult:
-    """Waits for the end of the scan that is ordered, and shows each of its states meanwhile."""
-    given = bus.give(camera, "Scan", wish)
+def ordered(bus: Client, camera: str, wish: object, advance: Advance, timeout_s: float = inf) -> OrderResult:
+    """Orders a scan, and shows each of its states until its end."""
 
-    def is_the_end(message: Message) -> bool:
-        payload = _read(message).payload
-        if isinstance(payload, ScanState) and payload.state == "running":
-            advance(payload)
-        return isinstance(payload, OrderResult) and payload.id == given and payload.final
+    def hear(said: object) -> None:
+        if isinstance(said, ScanState) and said.state == "running":
+            advance(said)
 
-    result: OrderResult = _read(bus.until(is_the_end, LONGEST_S, "the end of the scan")).payload
-    return result
-
-
-def _read(message: Message) -> topics.Read:
-    return topics.read(message, message.received)
+    return bus.order(camera, "Scan", wish, timeout_s, hear=hear)
 
 
 def table(found: Iterable[ScanResult]) -> Table:

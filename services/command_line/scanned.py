@@ -1,6 +1,6 @@
 """What `apartment scan --plot` draws: the rooms, the places in the order of their visits, and the results of a scan.
 
-Not here: the order and its answers (`__main__.py`), the drawing (`vision/chart.py`). Where markers truly are is known
+Not here: the order and its answers (`scan.py`), the drawing (`vision/chart.py`). Where markers truly are is known
 of a simulated camera only, from its world's file; the camera's service never sees that.
 """
 

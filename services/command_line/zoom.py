@@ -11,11 +11,11 @@ from rich.table import Table
 from services import client, topics
 from services.bus import Message
 from services.command_line.options import CONFIG, Camera, Config, YesMove, out
+from services.command_line.order import tell, with_camera
 from services.config import load
 from services.errors import ConfigError
-from services.payloads import Calibration, OrderResult
+from services.payloads import Calibration
 
-LONGEST_S = 900.0
 ASK = (
     "May {} zoom in and out now? It takes some minutes; it should look at something with outlines, not at a blank wall."
 )
@@ -27,13 +27,13 @@ def zoom(
     config: Config = CONFIG,
 ) -> None:
     """Learn what each level of zoom magnifies by, from pictures of what the camera looks at; exit 1 when it was not."""
-    apartment = load(config, (f"camera-{camera}",))
+    apartment = with_camera(load(config, (f"camera-{camera}",)), camera)
     if not yes_move and not sys.stdin.isatty():
         raise ConfigError(["--yes-move: expected it where nobody can be asked: the camera moves"])
     if not yes_move and not Confirm.ask(ASK.format(camera), console=out):
         raise typer.Exit(1)
-    with client.connected(apartment.bus, (topics.CAMERA_ORDER_RESULT.filter, topics.CAMERA_CALIBRATION.filter)) as bus:
-        result = bus.order(camera, "CalibrateZoom", "True", timeout_s=LONGEST_S, tell=_tell)
+    with client.connected(apartment.bus, [topics.CAMERA_CALIBRATION.filter]) as bus:
+        result = bus.order(camera, "CalibrateZoom", "True", tell=tell)
         last = _last(bus.seen, camera)
     if last is not None and last.state == "done":
         show(last)
@@ -55,7 +55,3 @@ def _last(seen: list[Message], camera: str) -> Calibration | None:
     topic = topics.CAMERA_CALIBRATION.name(cam=camera)
     said = [topics.read(message, message.received).payload for message in seen if message.topic == topic]
     return next((one for one in reversed(said) if one.what == "zoom"), None)
-
-
-def _tell(result: OrderResult) -> None:
-    out.print(f"{result.key}: {result.state}{f' ({result.error})' if result.error else ''}")

@@ -59,6 +59,11 @@ class Terminal:
             self.process.send_signal(number)
         return self.process.wait(LIMIT_S)
 
+    def rest(self) -> list[str]:
+        """The lines that nobody has read, once it has ended."""
+        self._reader.join(LIMIT_S)
+        return [self.lines.get() for _ in range(self.lines.qsize())]
+
 
 @contextmanager
 def apartment(config: Path, *words: str) -> Iterator[Terminal]:

@@ -51,7 +51,7 @@ def test_what_is_to_be_printed_is_written(
         (["board", "--out", "board.pdf", "--marker", "31"], "markers of 30 to 95 % of a square"),
         (["markers", "582", "17", "--out", "markers.png"], "expected a .pdf for several"),
         (["markers", "5820", "--out", "markers.pdf"], "from 0 to 999, got 5820"),
-        (["lens", "attic", "--config", str(CONFIG / "simulated.yaml")], "cameras: expected 'attic' there"),
+        (["lens", "attic", "--config", str(CONFIG / "simulated.yaml")], "cameras: expected one of ip1, got 'attic'"),
         (["mount", "ip1", "--at", "582=1,2", "--config", str(CONFIG / "simulated.yaml")], "--at: expected ID=X,Y,Z"),
         (["mount", "ip1", "--config", str(CONFIG / "simulated.yaml")], "--yes-move: expected it"),
     ],
