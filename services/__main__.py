@@ -153,7 +153,7 @@ def probe(
 
 
 app.command(epilog="Example: apartment order ip1 Goto Kitchen")(order.order)
-app.command(epilog="Example: apartment scan ip1 --target 582")(scan.scan)
+app.command(epilog="Example: apartment scan ip1 --target 582 17")(scan.scan)
 stored.add_to(app)
 app.command(epilog="Example: apartment backup apartment.zip")(backup.backup)
 app.command(epilog="Example: apartment restore apartment.zip")(backup.restore)

@@ -26,34 +26,42 @@ from services.payloads import OrderResult, ScanResult, ScanState
 from services.topics import read
 
 Advance = Callable[[ScanState], None]
+Target = Annotated[
+    list[int], typer.Option(metavar="ID...", help="The markers; may be repeated.", autocompletion=completion.markers)
+]
+More = Annotated[
+    list[int] | None, typer.Argument(metavar="ID", help="More, after --target.", autocompletion=completion.markers)
+]
 
 
 def scan(
     camera: Camera,
-    target: Annotated[list[int], typer.Option(help="A marker; repeat for more.", autocompletion=completion.markers)],
+    target: Target,
+    more: More = None,
     full: Annotated[bool, typer.Option("--full", help="Every place, in both picture modes.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw a plan with what was found into this PNG file.")] = None,
     world: Annotated[Path | None, typer.Option(help="The file with the rooms; default: the simulated one.")] = None,
     config: Config = CONFIG,
     json: Json = False,
 ) -> None:
-    """Look for markers with a camera; exit 1 when one was not found."""
+    """Look for markers with a camera; exit 1 when one of them was not found."""
     from services.command_line import scanned  # it brings OpenCV
 
     apartment = with_camera(load(config), camera)
+    wanted = list(dict.fromkeys([*target, *(more or [])]))
     filters = [row.filter_for(cam=camera) for row in scanned.HEARD]
     with client.connected(apartment.bus, filters) as bus, progress(out, quiet=json) as advance:
-        end = ordered(bus, camera, {"targets": target, "full": full}, advance)
-    said = (read(message, message.received).payload for message in bus.seen)
-    found = {one.marker: one for one in said if isinstance(one, ScanResult)}
+        end = ordered(bus, camera, {"targets": wanted, "full": full}, advance)
+    found = newest(read(message, message.received).payload for message in bus.seen)
+    missing = [str(marker) for marker in wanted if marker not in found]
     if json:
         for one in found.values():
-            out.print_json(one.model_dump_json())
+            out.print_json(one.model_dump_json(), indent=None)
     else:
-        out.print(table(found.values()) if found else f"found nothing: {end.error or end.state}")
+        _show(found, missing, "" if end.state == "done" else f" ({end.error or end.state})")
     if plot is not None:
         scanned.plot(apartment, camera, bus.seen, plot, world)
-    if end.state != "done" or not found:
+    if end.state != "done" or missing:
         raise typer.Exit(1)
 
 
@@ -84,6 +92,19 @@ def ordered(bus: Client, camera: str, wish: object, advance: Advance, timeout_s:
             advance(said)
 
     return bus.order(camera, "Scan", wish, timeout_s, hear=hear)
+
+
+def newest(said: Iterable[object]) -> dict[int, ScanResult]:
+    """By marker, where it was seen last: a scan tells of every place where a marker was seen at a time."""
+    results = [one for one in said if isinstance(one, ScanResult)]
+    return {one.marker: one for one in sorted(results, key=lambda result: result.stamp)}
+
+
+def _show(found: dict[int, ScanResult], missing: list[str], why: str) -> None:
+    if found:
+        out.print(table(found.values()))
+    if missing:
+        out.print(f"not found: {', '.join(missing)}{why}", markup=False)
 
 
 def table(found: Iterable[ScanResult]) -> Table:

@@ -13,6 +13,7 @@ import numpy as np
 
 from services import camera, topics
 from services.bus import Message
+from services.command_line.scan import newest
 from services.config import Apartment
 from services.payloads import Places, ScanResult, ScanState
 from services.simulators import camera as simulated
@@ -49,7 +50,7 @@ def _simulator(apartment: Apartment, name: str) -> simulated.Config | None:
 
 
 def _plan(name: str, mount: Mount, payloads: list[object], world: World | None, *, simulated: bool) -> Plan:
-    results = {one.marker: one for one in payloads if isinstance(one, ScanResult)}
+    results = newest(payloads)
     states = [one for one in payloads if isinstance(one, ScanState) and one.scan]
     places = next((one.root for one in payloads if isinstance(one, Places)), {})
     last = states[-1] if states else ScanState(state="done")

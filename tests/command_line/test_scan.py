@@ -1,14 +1,19 @@
-"""`apartment scan`: how far it is, and what it found, as people read it; the command itself runs in `test_docs.py`."""
+"""`apartment scan`: what is asked for, how far it is, and what it found; a true scan by it runs in `test_docs.py`."""
 
 from __future__ import annotations
 
 import io
+import json
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
-from services.command_line.scan import progress, table
+from services.client import Client
+from services.command_line.scan import newest, progress, table
 from services.payloads import Point, ScanResult, ScanState
+from tests.command_line.playing import answer, taken
+from tests.command_line.terminal import apartment, done
 
 SEEN = ScanResult(
     camera="ip1", marker=582, dictionary="DICT_5X5_1000", place="Living room", position=Point(x=1.234, y=0.87, z=0.74),
@@ -52,3 +57,66 @@ def test_on_a_terminal_it_is_a_bar() -> None:
         advance(ScanState(state="running", place="Sofa", progress=0.5, frames_analysed=7))
     assert "Sofa (7 frames)" in text(console)
     assert "━" in text(console)
+
+
+def seen(marker: int, place: str, stamp: str) -> ScanResult:
+    return SEEN.model_copy(update={"marker": marker, "place": place, "stamp": f"2026-01-31T07:05:{stamp}Z"})
+
+
+def test_of_a_marker_seen_at_several_places_the_newest_is_told() -> None:
+    last, before, other = seen(582, "Sofa", "09.500"), seen(582, "Kitchen", "08.900"), seen(17, "TV", "01.000")
+    for said in ([last, before, other], [other, before, last], ["offline", before, None, other, last]):
+        assert newest(said) == {582: last, 17: other}
+
+
+FOUND_582 = [seen(582, "Sofa", "09.500"), seen(582, "Kitchen", "08.900")]  # as a scan tells them
+
+
+def scanned(
+    config: Path, camera: Client, words: str, found: list[ScanResult], state: str = "done", error: str | None = None
+) -> tuple[list[int], int, list[str]]:
+    """The markers that such a command looks for, its exit code and what it prints, when that is found."""
+    with apartment(config, "scan", "ip1", *words.split()) as terminal:
+        order = taken(camera, "Scan")
+        answer(camera, "Scan", order, "running")
+        for one in found:
+            camera.say("camera/ip1/scan/result", one.model_dump_json())
+        answer(camera, "Scan", order, state, error)
+        camera.pump()
+        return order["value"]["targets"], terminal.ended(), terminal.rest()
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["--target 582 17", "--target 582 --target 17", "--target 582 17 --full", "--full --target 582 --target 17 582"],
+)
+def test_several_markers_are_given_after_one_word_or_after_one_each(words: str, config: Path, camera: Client) -> None:
+    targets, code, lines = scanned(config, camera, words, [*FOUND_582, seen(17, "TV", "01.000")])
+    assert (targets, code) == ([582, 17], 0)
+    assert "not found" not in "".join(lines)
+
+
+def test_a_scan_that_finds_only_some_of_the_markers_says_which_are_missing_and_exits_1(
+    config: Path, camera: Client
+) -> None:
+    _, code, lines = scanned(config, camera, "--target 582 17 9", FOUND_582)
+    assert (code, lines[-1]) == (1, "not found: 17, 9")
+    shown = "\n".join(lines)
+    assert "Sofa" in shown
+    assert "Kitchen" not in shown
+
+
+def test_a_scan_that_is_refused_says_why(config: Path, camera: Client) -> None:
+    _, code, lines = scanned(config, camera, "--target 582", [], "refused", "no places to visit")
+    assert (code, lines) == (1, ["not found: 582 (no places to visit)"])
+
+
+def test_as_data_each_marker_that_was_found_is_a_line(config: Path, camera: Client) -> None:
+    _, code, lines = scanned(config, camera, "--target 582 17 9 --json", [*FOUND_582, seen(17, "TV", "01.000")])
+    told = {one["marker"]: one["place"] for one in map(json.loads, lines)}
+    assert (code, told) == (1, {582: "Sofa", 17: "TV"})
+
+
+@pytest.mark.parametrize("words", ["", "582", "--target", "--target sofa", "--target 582 sofa"])
+def test_a_scan_without_markers_is_wrong_usage(words: str, config: Path) -> None:
+    assert done(config, "scan", "ip1", *words.split())[0] == 2
