@@ -15,7 +15,7 @@ from services.bridge.node import Node
 from services.bridge.part import Part, status
 from services.bridge.rules import Fields, Heard
 from services.bus import Message
-from services.payloads import Position, Stream
+from services.payloads import RTSP_PICTURE, Position, Stream
 
 EVERY_S = 1.0  # between two looks whether it runs, and between two words of it
 OK, WARN, ERROR = 0, 1, 2
@@ -40,7 +40,7 @@ class Pictures(Part):
             return
         before = self._told[cam]
         if isinstance(said, Stream):
-            self._told[cam] = Told(cam, said.url if said.rtsp else "", before.zoom)
+            self._told[cam] = Told(cam, said.beside(RTSP_PICTURE) if said.rtsp else "", before.zoom)
         elif isinstance(said, Position):
             self._told[cam] = Told(cam, before.url, said.zoom)
         if self._told[cam] != before:

@@ -105,13 +105,10 @@ class House:
             if isinstance(parts, AsyncGenerator):
                 await parts.aclose()
 
-    def picture_of(self, camera: str, name: str = "") -> str | None:
-        """Where the camera service has its stream, or with a name another picture beside it; None: it has not said."""
+    def picture_of(self, camera: str, name: str) -> str:
+        """Where the camera service has the picture of that name; empty: it has not said."""
         text = self.latest(topics.CAMERA_STREAM.name(cam=camera))
-        if text is None:
-            return None
-        url = Stream.model_validate_json(text).url
-        return f"{url.rpartition('/')[0]}/{name}" if name else url
+        return "" if text is None else Stream.model_validate_json(text).beside(name)
 
     def latest(self, topic: str) -> str | None:
         """The newest text on a topic."""

@@ -14,6 +14,7 @@ OrderState = Literal["accepted", "running", "done", "failed", "refused", "cancel
 FINAL: tuple[OrderState, ...] = ("done", "failed", "refused", "cancelled")  # an order has one of them once
 Who = Literal["human", "mission", "scan"]
 LONGEST_ID = 64  # of an order
+RTSP_PICTURE = "rtsp.mjpg"  # see `Stream`
 LARGEST = 1e300  # so that whoever takes a number may make a float of it
 
 
@@ -259,8 +260,15 @@ class Calibration(Payload):
 
 
 class Stream(Payload):
-    """`camera/<cam>/stream`: which streams are on, and where the picture can be had without a password."""
+    """`camera/<cam>/stream`: which streams are on, and where the picture can be had without a password.
+
+    At `url` while `mjpeg` is on; for ROS and the dashboard, while `rtsp` is on, at RTSP_PICTURE beside it.
+    """
 
     rtsp: bool
     mjpeg: bool
     url: str
+
+    def beside(self, name: str) -> str:
+        """The address of another picture of that camera; empty while there is none."""
+        return f"{self.url.rpartition('/')[0]}/{name}" if self.url else ""

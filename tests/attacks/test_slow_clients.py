@@ -45,7 +45,7 @@ def dashboard(folder: Path) -> Iterator[Address]:
 def stream(_: Path) -> Iterator[Address]:
     """A camera's, which is off."""
     settings = StreamSettings()
-    with closing(Proxy("ip1", settings, Newest(Upright()), lambda: False, lambda: False)) as proxy:
+    with closing(Proxy("ip1", settings, Newest(Upright()), lambda _: False, lambda: False)) as proxy:
         yield proxy.server_port, proxy.stream_path, 503, settings.viewers + UNSEATED
 
 

@@ -52,7 +52,7 @@ class Stream:
 def stream(fps: float, colour: tuple[int, int, int] = (90, 90, 90)) -> Iterator[Stream]:
     """The camera service's own port, fed with numbers."""
     newest = Newest(Upright(flip=True, mirror=True))
-    proxy = Proxy("ip1", StreamSettings(fps=60), newest, lambda: True, lambda: True)
+    proxy = Proxy("ip1", StreamSettings(fps=60), newest, lambda key: key == "RTSP", lambda: True)
     running = Stream(f"http://127.0.0.1:{proxy.server_port}/camera/ip1/stream.mjpg")
     stopping = threading.Event()
 

@@ -66,7 +66,7 @@ def busy(flat: Simulated, bus: Client) -> None:
                           "Radio_Volume": "35", "Bedroom_Shutter": "40"}.items():  # fmt: skip
         bus.say(f"home/{item}/command", command)
     yesterday(flat)
-    bus.say("camera/ip1/order/MJPEG", "ON")
+    bus.say("camera/ip1/order/RTSP", "ON")
     for place in PLACES:
         bus.order("ip1", "Goto", place)
         bus.collect(2.5)

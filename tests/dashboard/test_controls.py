@@ -156,7 +156,7 @@ def watched(shown: Page, bus: Client) -> None:
     """The live picture, and one that is taken away."""
     live = shown.get_by_role("button", name=re.compile("^Live picture"))
     on = live.get_attribute("aria-pressed") == "true"
-    assert ordered(bus, "MJPEG", live.click) is not on
+    assert ordered(bus, "RTSP", live.click) is not on
     expect(live).to_have_attribute("aria-pressed", "false" if on else "true")
     with shown.expect_download() as taken:
         shown.get_by_role("link", name="Snapshot").click()

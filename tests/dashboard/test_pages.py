@@ -99,11 +99,13 @@ def test_a_change_is_seen_within_300_ms_of_its_message(shown: Page, bus: Client)
 
 
 def test_the_camera_is_centred_by_a_click_and_its_view_turns_on_the_plan(shown: Page, bus: Client) -> None:
-    bus.say("camera/ip1/order/MJPEG", "ON")
+    bus.say("camera/ip1/order/RTSP", "ON")
     view(shown, "camera")
     expect(shown.locator(".video.seen")).to_be_visible()
     before = bus.payload("camera/ip1/position", lambda one: not one.moving)
     picture = shown.locator(".video img")
+    expect(picture).to_have_attribute("src", re.compile("stream.mjpg"))
+    expect(shown.locator(".video .over")).to_be_hidden()
     box = picture.bounding_box()
     assert box is not None
     bus.forget()

@@ -29,7 +29,7 @@ def camera(*, on: bool = True) -> Iterator[tuple[Proxy, str]]:
         while not ended.wait(0.05):
             newest.put(lambda: np.zeros((90, 160, 3), np.uint8), Exposure(0, 0), newest.clock())
 
-    proxy = Proxy("ip1", StreamSettings(fps=30), newest, lambda: on, lambda: True)
+    proxy = Proxy("ip1", StreamSettings(fps=30), newest, lambda _: on, lambda: True)
     source = threading.Thread(target=expose)
     source.start()
     try:

@@ -182,12 +182,11 @@ def _ports(running: Whole, seed: int) -> list[requests.Source]:
     with connected(running.bus, [CAMERA_STREAM.filter]) as bus:
         stream = httpx.URL(bus.payload(CAMERA_STREAM.name(cam="ip1")).url)
     paths = [*api["paths"], "/", "/main.js", "/style.css", "/favicon.ico"]
+    others = ["/camera/ip1/rtsp.mjpg", "/camera/ip1/snapshot.jpg", "/camera/{x}/stream.mjpg"]
     return [
         requests.Source(seed, page["port"], paths, {"X-CSRF-Token": token}),
         requests.Source(seed + 1, page["port"], paths, {}),
-        requests.Source(
-            seed + 2, int(stream.port or 80), [stream.path, "/camera/ip1/snapshot.jpg", "/camera/{x}/stream.mjpg"], {}
-        ),
+        requests.Source(seed + 2, int(stream.port or 80), [stream.path, *others], {}),
         requests.Source(seed + 3, int(httpx.URL(metrics["metrics"]).port or 80), ["/metrics", "/", "/favicon.ico"], {}),
     ]
 

@@ -67,6 +67,10 @@ class Channel:
         """Whether anybody is to see moving pictures."""
         return self.rtsp or self.mjpeg
 
+    def is_on(self, key: str) -> bool:
+        """Whether that order has switched its stream on."""
+        return {"RTSP": self.rtsp, "MJPEG": self.mjpeg}[key]
+
     @property
     def flows(self) -> bool:
         """Whether pictures come by themselves now."""
@@ -158,7 +162,7 @@ class Channel:
         if self._proxy is not None:
             return
         try:
-            self._proxy = Proxy(self.camera, self.settings, self.newest, lambda: self.on, self.ask)
+            self._proxy = Proxy(self.camera, self.settings, self.newest, self.is_on, self.ask)
             self._base = (self.settings.url or self._own_url(self._proxy)).rstrip("/")
         except OSError as error:
             log.error("%s: no stream at %s:%d: %s", self.camera, self.settings.host, self.settings.port, error)

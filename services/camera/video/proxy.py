@@ -1,6 +1,7 @@
 """Our own stream: the newest picture for everybody who may look, as multipart JPEG, and one picture at a time.
 
-    /camera/<cam>/stream.mjpg     while RTSP or MJPEG is on; X-Timestamp says when each picture was exposed
+    /camera/<cam>/stream.mjpg     while MJPEG is on; X-Timestamp says when each picture was exposed
+    /camera/<cam>/rtsp.mjpg       the same while RTSP is on: for who shows it on ROS and in the dashboard
     /camera/<cam>/snapshot.jpg    always: the newest picture, or a snapshot taken for it
 
 No credentials: loopback and the configured networks may look, all others get 403. Nothing else is served. The standard
@@ -24,6 +25,7 @@ from urllib.parse import urlsplit
 from services.camera.video.newest import Newest
 from services.camera.video.settings import Network, StreamSettings
 from services.http_doors import Doors, Visitor
+from services.payloads import RTSP_PICTURE
 
 BOUNDARY = "picture"
 QUIET_S = 2.0  # between two looks whether a viewer is still there, while no picture comes
@@ -42,18 +44,19 @@ STRICT = (
 
 
 class Proxy(Doors):
-    """The port. `on()`: whether the stream is switched on; `ask()` asks for a snapshot, which will come into the
-    slot; False when there is nobody to ask.
+    """The port. `on(key)`: whether the order of that key has switched its stream on; `ask()` asks for a snapshot,
+    which will come into the slot; False when there is nobody to ask.
 
     OSError when it cannot listen there.
     """
 
     def __init__(
-        self, camera: str, settings: StreamSettings, newest: Newest, on: Callable[[], bool], ask: Callable[[], bool]
+        self, camera: str, settings: StreamSettings, newest: Newest, on: Callable[[str], bool], ask: Callable[[], bool]
     ) -> None:
         super().__init__(settings.host, settings.port, Viewer, settings.viewers + UNSEATED)
         self.settings, self.newest, self.on, self.ask = settings, newest, on, ask
         self.stream_path = f"/camera/{camera}/stream.mjpg"
+        self.keys = {self.stream_path: "MJPEG", f"/camera/{camera}/{RTSP_PICTURE}": "RTSP"}
         self.snapshot_path = f"/camera/{camera}/snapshot.jpg"
         self.names = _own_names(settings)
         self.seats = BoundedSemaphore(settings.viewers)
@@ -126,13 +129,13 @@ class Viewer(Visitor):
         path = self.path.partition("?")[0]
         if not self.server.may_look(str(self.client_address[0])) or not self.server.knows(self.headers["Host"] or ""):
             self._refuse(HTTPStatus.FORBIDDEN, "this address may not look: see stream.allow in the configuration")
-        elif path not in (self.server.stream_path, self.server.snapshot_path):
-            self._refuse(HTTPStatus.NOT_FOUND, f"there are {self.server.stream_path} and {self.server.snapshot_path}")
+        elif path not in (*self.server.keys, self.server.snapshot_path):
+            self._refuse(HTTPStatus.NOT_FOUND, f"there are {', '.join(self.server.keys)}, {self.server.snapshot_path}")
         elif not self.server.seats.acquire(blocking=False):
             self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "too many viewers", ("Retry-After", "5"))
         else:
             try:
-                self._stream() if path == self.server.stream_path else self._snapshot()
+                self._snapshot() if path == self.server.snapshot_path else self._stream(self.server.keys[path])
             finally:
                 self.server.seats.release()
 
@@ -148,21 +151,21 @@ class Viewer(Visitor):
         else:
             self._refuse(HTTPStatus(code), "not a request that is understood here")
 
-    def _stream(self) -> None:
-        if not self.server.on():
-            return self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "the stream is off: order RTSP or MJPEG")
+    def _stream(self, key: str) -> None:
+        if not self.server.on(key):
+            return self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, f"the stream is off: order {key}")
         self._head(HTTPStatus.OK, ("Content-Type", f"multipart/x-mixed-replace; boundary={BOUNDARY}"))
         if self.command == "HEAD":
             return None
         with self.server.newest.watched():
-            self._pictures()
+            self._pictures(key)
         return None
 
-    def _pictures(self) -> None:
+    def _pictures(self, key: str) -> None:
         """The boundary follows each picture at once: a browser shows it when it knows where it ends."""
         self.wfile.write(f"--{BOUNDARY}\r\n".encode())
         number, step, due = self.server.newest.stale(FRESH_S), 1 / self.server.settings.fps, monotonic()
-        while self.server.on() and not self.server.closing and not self._gone(max(0.0, due - monotonic())):
+        while self.server.on(key) and not self.server.closing and not self._gone(max(0.0, due - monotonic())):
             found = self.server.newest.jpeg(number, QUIET_S)
             if found is None:
                 continue

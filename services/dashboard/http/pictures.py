@@ -9,6 +9,7 @@ from services.dashboard.http.endpoint import Asked, Endpoint, one_of
 from services.dashboard.http.thumbnails import Thumbnails
 from services.dashboard.http.video import BOUNDARY, Videos
 from services.errors import BadMessage, Unavailable
+from services.payloads import RTSP_PICTURE
 
 MIXED = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
 
@@ -42,7 +43,7 @@ class Gallery:
 
     async def stream(self, asked: Asked) -> Response:
         """The camera's, for as long as the session."""
-        pictures = self.house.while_logged_in(asked.token, await self.videos.watch(self._address(asked)))
+        pictures = self.house.while_logged_in(asked.token, await self.videos.watch(self._address(asked, RTSP_PICTURE)))
         return StreamingResponse(pictures, 200, {"cache-control": "no-store"}, MIXED)
 
     async def snapshot(self, asked: Asked) -> Response:
@@ -73,8 +74,8 @@ class Gallery:
     def _camera(self, asked: Asked) -> str:
         return one_of(self.house.config.cameras, asked.path("camera"), "camera")
 
-    def _address(self, asked: Asked, name: str = "") -> str:
+    def _address(self, asked: Asked, name: str) -> str:
         url = self.house.picture_of(camera := self._camera(asked), name)
-        if url is None:
+        if not url:
             raise Unavailable(f"the service of {camera} has not said where its picture is")
         return url

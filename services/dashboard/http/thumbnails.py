@@ -78,7 +78,7 @@ class Thumbnails:
 
     async def _take(self, camera: str, place: str, now: float) -> None:
         url = self.house.picture_of(camera, SNAPSHOT)
-        if url is None:
+        if not url:
             return
         try:
             data = await self.videos.snapshot(url)

@@ -71,7 +71,7 @@ def showing(folder: Path) -> Iterator[tuple[Proxy, str]]:
             image = np.full((300, 400, 3), GREEN if seen < 5 else BLUE, np.uint8)
             newest.put(lambda image=image: image, Exposure(0, 0), newest.clock())
 
-    proxy = Proxy("ip1", StreamSettings(), newest, lambda: True, lambda: None)
+    proxy = Proxy("ip1", StreamSettings(), newest, lambda _: True, lambda: None)
     source = threading.Thread(target=expose)
     source.start()
     slow = snail(ended)

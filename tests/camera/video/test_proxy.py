@@ -39,7 +39,7 @@ class Studio:
 
     newest: Newest
     proxy: Proxy
-    on: threading.Event
+    on: set[str]
     asked: list[float] = field(default_factory=list)
     developed: list[int] = field(default_factory=list)
     numbers: Iterator[int] = field(default_factory=lambda: itertools.count(1))
@@ -76,9 +76,8 @@ def settings() -> StreamSettings:
 
 @pytest.fixture
 def studio(settings: StreamSettings) -> Iterator[Studio]:
-    newest, on, asked = Newest(Upright()), threading.Event(), list[float]()
-    on.set()
-    proxy = Proxy("ip1", settings, newest, on.is_set, lambda: not asked.append(time.time()))
+    newest, on, asked = Newest(Upright()), {"RTSP", "MJPEG"}, list[float]()
+    proxy = Proxy("ip1", settings, newest, on.__contains__, lambda: not asked.append(time.time()))
     before = threading.active_count()
     yield Studio(newest, proxy, on, asked)
     proxy.close()
@@ -168,11 +167,20 @@ def test_a_stream_that_is_switched_off_ends_its_viewers_and_is_refused(studio: S
     look = Look(studio)
     studio.expose()
     look.next()
-    studio.on.clear()
+    studio.on.remove("MJPEG")
     assert look.answer.read() == b""
     status, _, body = studio.get("/camera/ip1/stream.mjpg")
     assert (status, b"the stream is off" in body) == (503, True)
     look.close()
+
+
+@pytest.mark.parametrize(("path", "key"), [("stream.mjpg", "MJPEG"), ("rtsp.mjpg", "RTSP")])
+def test_each_order_switches_a_path_of_its_own(studio: Studio, path: str, key: str) -> None:
+    studio.on.clear()
+    status, _, body = studio.get(f"/camera/ip1/{path}")
+    assert (status, f"order {key}\n".encode() in body) == (503, True)
+    studio.on.add(key)
+    assert studio.get(f"/camera/ip1/{path}", "HEAD")[0] == 200
 
 
 @pytest.mark.parametrize(
@@ -225,7 +233,7 @@ def test_a_page_elsewhere_that_calls_our_address_its_own_gets_no_picture(
 )
 def test_loopback_and_the_allowed_networks_may_look(allow: tuple[str, ...], address: str, may: bool) -> None:
     settings = StreamSettings.model_validate({"allow": allow})
-    proxy = Proxy("ip1", settings, Newest(Upright()), lambda: True, lambda: False)
+    proxy = Proxy("ip1", settings, Newest(Upright()), lambda _: True, lambda: False)
     assert proxy.may_look(address) is may
     proxy.close()
 
@@ -235,8 +243,8 @@ def test_who_may_not_look_is_told_so() -> None:
         def may_look(self, address: str) -> bool:
             return super().may_look("192.0.2.7")
 
-    proxy = Elsewhere("ip1", StreamSettings(), Newest(Upright()), lambda: True, lambda: False)
-    studio = Studio(proxy.newest, proxy, threading.Event())
+    proxy = Elsewhere("ip1", StreamSettings(), Newest(Upright()), lambda _: True, lambda: False)
+    studio = Studio(proxy.newest, proxy, set())
     status, _, body = studio.get("/camera/ip1/snapshot.jpg")
     assert (status, b"stream.allow" in body) == (403, True)
     proxy.close()
@@ -282,8 +290,8 @@ def test_a_snapshot_is_asked_for_when_no_picture_is_fresh_also_while_the_stream_
 
 
 def test_nobody_waits_for_a_camera_that_is_away() -> None:
-    proxy = Proxy("ip1", StreamSettings(), Newest(Upright()), lambda: False, lambda: False)
-    status, _, body = Studio(proxy.newest, proxy, threading.Event()).get("/camera/ip1/snapshot.jpg")
+    proxy = Proxy("ip1", StreamSettings(), Newest(Upright()), lambda _: False, lambda: False)
+    status, _, body = Studio(proxy.newest, proxy, set()).get("/camera/ip1/snapshot.jpg")
     assert (status, b"no picture" in body) == (504, True)
     proxy.close()
 
@@ -293,13 +301,13 @@ def test_strangers_keep_nobody_out() -> None:
         def may_look(self, address: str) -> bool:
             return address != "127.0.0.2"
 
-    proxy = Elsewhere("ip1", StreamSettings(viewers=1), Newest(Upright()), lambda: True, lambda: False)
+    proxy = Elsewhere("ip1", StreamSettings(viewers=1), Newest(Upright()), lambda _: True, lambda: False)
     with closing(proxy), ExitStack() as silent:
         for _ in range(30):
             port = ("127.0.0.1", proxy.server_port)
             silent.enter_context(socket.create_connection(port, source_address=("127.0.0.2", 0)))
         wait_until(lambda: proxy.porch._value == 0, "the porch to be full")
-        assert Studio(proxy.newest, proxy, threading.Event()).get("/")[0] == 404
+        assert Studio(proxy.newest, proxy, set()).get("/")[0] == 404
 
 
 def test_broken_pictures_are_counted_and_the_next_good_one_is_sent(studio: Studio) -> None:
@@ -321,7 +329,7 @@ def test_a_viewer_that_leaves_while_no_picture_comes_is_noticed(studio: Studio) 
 
 def test_the_end_of_the_service_ends_viewers_that_take_nothing() -> None:
     newest, before = Newest(Upright()), threading.active_count()
-    proxy = Proxy("ip1", StreamSettings(), newest, lambda: True, lambda: False)
+    proxy = Proxy("ip1", StreamSettings(), newest, lambda _: True, lambda: False)
     port = ("127.0.0.1", proxy.server_port)
     with socket.create_connection(port) as stuck, socket.create_connection(port):
         stuck.sendall(b"GET /camera/ip1/stream.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n")

@@ -49,6 +49,12 @@ def stream(here: Bench) -> dict[str, Any]:
     return said
 
 
+def address(here: Bench, key: str) -> str:
+    """Where the picture is while that order has switched it on."""
+    url: str = stream(here)["url"]
+    return url.replace("stream.mjpg", "rtsp.mjpg") if key == "RTSP" else url
+
+
 def diagnostic(here: Bench) -> dict[str, Any]:
     found = [one for one in here.said if one.topic == "diagnostics/camera/ip1"]
     return dict(httpx.Response(200, content=found[-1].payload).json())
@@ -88,8 +94,10 @@ def test_the_stream_is_switched_on_seen_and_switched_off(here: Bench, key: str) 
     url = stream(here)["url"]
     assert url.endswith("/camera/ip1/stream.mjpg")
     assert "ros" not in url
+    url, others = address(here, key), address(here, other.upper())
     image = turning(here, lambda: first_picture(url))
     assert abs(time_in(image, time.time()) - time.time()) < 5
+    assert httpx.get(others, timeout=30).status_code == 503
     here.until(lambda: float(diagnostic(here)["values"].get("stream_fps", 0)) > 10, 10)
     assert diagnostic(here)["values"]["stream"] == "rtsp"
     assert int(diagnostic(here)["values"]["stream_latency_ms"]) >= 300
@@ -108,7 +116,8 @@ def test_one_stream_stays_while_the_other_one_is_switched_off(here: Bench) -> No
         assert here.end_of(str(number), 20)["state"] == "done"
     here.turn()
     assert (stream(here)["rtsp"], stream(here)["mjpeg"]) == (False, True)
-    turning(here, lambda: first_picture(stream(here)["url"]))
+    turning(here, lambda: first_picture(address(here, "MJPEG")))
+    assert httpx.get(address(here, "RTSP"), timeout=30).status_code == 503
     assert here.service.feed.channel is not None
     assert here.service.feed.channel.reader.flow.connections == 1
 
@@ -119,7 +128,7 @@ def test_the_stream_is_upright_like_snapshots(here: Bench) -> None:
     for number, key in enumerate(("Flip", "Mirror")):
         here.order(key, "OFF", str(2 + number))
         assert here.end_of(str(2 + number), 20)["state"] == "done"
-    image = turning(here, lambda: first_picture(stream(here)["url"]))
+    image = turning(here, lambda: first_picture(address(here, "RTSP")))
     turned = np.ascontiguousarray(image[::-1, ::-1])
     assert abs(time_in(turned, time.time()) - time.time()) < 5
 
@@ -169,7 +178,7 @@ def test_without_rtsp_the_cameras_mjpeg_is_handed_on_where_that_is_allowed(
         here.order("RTSP", "ON", "1")
         assert here.end_of("1", 30)["state"] == "done"
         here.until(lambda: diagnostic(here)["values"]["stream"] == "mjpeg", 20)
-        url = stream(here)["url"]
+        url = address(here, "RTSP")
         here.until(lambda: turning(here, lambda: first_picture(url)).shape == (396, 704, 3), 20)
         here.until(lambda: diagnostic(here)["message"] == "online", 5)
 

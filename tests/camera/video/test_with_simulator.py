@@ -15,7 +15,7 @@ from services import payloads
 from services.camera.video import pictures
 from services.simulators import camera as simulated
 from tests.camera.bench import Bench, bench, simulator
-from tests.camera.video.test_stream import diagnostic, first_picture, stream, turning
+from tests.camera.video.test_stream import address, diagnostic, first_picture, stream, turning
 
 pytest.importorskip("gi", reason="apt-get install python3-gi gir1.2-gst-rtsp-server-1.0 gstreamer1.0-plugins-ugly")
 pytestmark = pytest.mark.rtsp
@@ -44,7 +44,7 @@ def status(here: Bench) -> str:
 def test_the_cameras_stream_is_shown(tmp_path: Path, camera: simulated.Simulated) -> None:
     with seeing(tmp_path, camera) as here:
         switch_on(here)
-        image = turning(here, lambda: first_picture(stream(here)["url"]))
+        image = turning(here, lambda: first_picture(address(here, "RTSP")))
         assert image.shape[1] == 704
         snapshot = turning(
             here, lambda: httpx.get(stream(here)["url"].replace("stream.mjpg", "snapshot.jpg"), timeout=30)

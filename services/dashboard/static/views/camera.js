@@ -38,7 +38,7 @@ function one(stage, camera, may, state) {
   const order = (key, value) => api.order(`/api/cameras/${name}/orders/${key}`, { value });
   const picture = video(name, may && camera.lens && camera.mount ? (right, down) => api.order(`/api/cameras/${name}/centre`, { right, down }) : null);
   const where = h("dl", { class: "where" });
-  const streaming = h("button", { onclick: () => order("MJPEG", streaming.getAttribute("aria-pressed") !== "true"), "aria-pressed": "false" }, "Live picture");
+  const streaming = h("button", { onclick: () => order("RTSP", streaming.getAttribute("aria-pressed") !== "true"), "aria-pressed": "false" }, "Live picture");
   const stops = [];
   const parts = [places(name, may, order, stops), may ? controls(order, stops) : null, scan(camera, may, order, stops), may ? looks(name, order, stops) : null, may ? sound(name, order, stops) : null, log(name, stops)];
   stage.replaceChildren(h("div", { class: "columns camera" },
@@ -53,9 +53,9 @@ function one(stage, camera, may, state) {
     live.watch(at("position"), ({ json }) => where.replaceChildren(line("Pan", `${json.pan.toFixed(1)}°`), line("Tilt", `${json.tilt.toFixed(1)}°`), line("Zoom", `${json.zoom}`), line("Place", json.moving ? "moving …" : (json.place ?? "–")))),
     live.watch(at("status"), ({ json }) => state.replaceChildren(badge(json.state, KINDS[json.state] ?? "bad"), h("span", { class: "hint" }, json.reason))),
     live.watch(at("stream"), ({ json }) => {
-      streaming.setAttribute("aria-pressed", `${json.mjpeg}`);
-      text(streaming, json.mjpeg ? "Live picture: on" : "Live picture: off");
-      picture.show(json.mjpeg || json.rtsp);
+      streaming.setAttribute("aria-pressed", `${json.rtsp}`);
+      text(streaming, json.rtsp ? "Live picture: on" : "Live picture: off");
+      picture.show(json.rtsp);
     }),
   );
   return () => {
