@@ -359,11 +359,27 @@ def test_a_stop_is_never_one_too_many(bridge: Driven) -> None:
     assert bridge.robot_says("/ip_camera_order", "Goto", "Kitchen")
 
 
-@pytest.mark.parametrize(("x", "z"), [(361.0, 0.0), (-1e9, 0.0), (10.0, 8.5), (float("nan"), 0.0)])
-def test_a_position_out_of_range_goes_nowhere(bridge: Driven, x: float, z: float) -> None:
+@pytest.mark.parametrize(("x", "z"), [(361.0, 0.0), (-1e9, 0.0), (10.0, 8.5)])
+def test_a_position_out_of_range_is_the_cameras_to_refuse(bridge: Driven, x: float, z: float) -> None:
     bridge.node.send("/ip_camera_position", {"x": x, "y": 0.0, "z": z})
-    with pytest.raises(BadMessage):
+    (message,) = bridge.service.handle(bridge.take()[0], NOW)
+    said = json.loads(message.payload)
+    assert (message.topic, said["pan"], said["zoom"]) == ("camera/ip1/position/set", x, z)
+
+
+@pytest.mark.parametrize(("key", "value"), [("Zoom", "9"), ("AudioRec", "0.5"), ("AudioRec", "601")])
+def test_an_order_out_of_range_is_the_cameras_to_refuse(bridge: Driven, key: str, value: str) -> None:
+    ((topic, order),) = bridge.robot_says("/ip_camera_order", key, value)
+    assert (topic, json.loads(order)["value"]) == (f"camera/ip1/order/{key}", value)
+
+
+@pytest.mark.parametrize("x", [float("nan"), float("inf"), -float("inf")])
+def test_a_position_that_is_no_number_goes_nowhere_and_is_told(bridge: Driven, x: float) -> None:
+    bridge.node.send("/ip_camera_position", {"x": x, "y": 0.0, "z": 0.0})
+    with pytest.raises(BadMessage, match=r"/ip_camera_position .*: expected finite numbers"):
         list(bridge.service.handle(bridge.take()[0], NOW))
+    assert "expected finite numbers" in bridge.own_health(NOW + 0.5)["message"]
+    assert bridge.service.counters["refused"] == 1
 
 
 @pytest.mark.parametrize(

@@ -397,6 +397,21 @@ def test_an_order_does_what_it_says_and_is_answered_step_by_step(case: Case, her
     case.after(here)
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "allowed"),
+    [
+        ("Position", '{"pan": 400.0, "tilt": 20.0, "zoom": 0.0}', "0 to 360"),
+        ("Position", '{"pan": 60.0, "tilt": -90.5, "zoom": 0.0}', "-10 to 108"),
+        ("Zoom", "9", "0 to 8"),
+        ("AudioRec", "601", "0 to 600"),
+    ],
+)
+def test_what_is_out_of_range_is_refused_naming_it(here: Here, key: str, value: str, allowed: str) -> None:
+    answers = here.order(key, value)
+    assert [answer.state for answer in answers] == ["refused"]
+    assert allowed in str(answers[0].error)
+
+
 def test_calibrating_turns_the_camera_and_a_stop_ends_it(here: Here) -> None:
     """The whole of it takes most of a minute; it is tried in virtual time."""
     stands_at(60.0, 20.0)(here)
