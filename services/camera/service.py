@@ -74,7 +74,7 @@ class CameraService:
         self.config = config
         self.subscribes = (*(topic.filter_for(cam=config.name) for topic in TOPICS), LOST_TOPIC)
         self.due: float | None = 0.0
-        self.counters: dict[str, int] = {"requests": 0, "failed_requests": 0, "frames": 0}
+        self.counters: dict[str, int] = {"requests": 0, "failed_requests": 0, "frames": 0, "failed_snapshots": 0}
         self._out: list[Message] = []
         publish = self._out.append
         self.places = Places(config.folder / config.places)
@@ -93,7 +93,7 @@ class CameraService:
         self.scanner.begin = self._begin
         self.calibrator = Calibrator(config, self.trips, self.scanner, publish)
         self.bulletin.video = channel
-        self.feed = Feed(config, self.health, channel, publish)
+        self.feed = Feed(config, self.health, self.bulletin.facts, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
         self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes, self.calibrator)
         self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=hears)
@@ -126,13 +126,15 @@ class CameraService:
         """Wakes the plans, and publishes what has changed."""
         if not self._polling:
             self._polling = True
-            for plan in (self._poll(now), self.feed.run(now), self.feed.every_so_often(now), self.upkeep.plan(now)):
+            feed = self.feed
+            plans = (self._poll(now), feed.run(now), feed.every_so_often(now), feed.mended(now), self.upkeep.plan(now))
+            for plan in plans:
                 self.stage.begin(plan, now, _nobody)
         self.early.tick(now)
         self.stage.tick(now)
         self.motors.tick(now)
         self.health.moving = self.motors.busy
-        self.counters["frames"] = self.scanner.frames
+        self.counters |= {"frames": self.scanner.frames, "failed_snapshots": self.feed.spoilt.count}
         self.scanner.tick(now)
         self._watch_motion(now)
         self.bulletin.tick(now, self.counters)

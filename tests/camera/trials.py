@@ -215,6 +215,7 @@ class Fault:
     states: tuple[str, ...]
     settings: Mapping[str, object] = field(default_factory=dict)
     also: str = ""  # another order of the side door, at the same time
+    asked: str = ""  # on this topic of the camera, at the same time: nothing shows it before
     meanwhile: Callable[[Client], None] = lambda bus: None  # what has to hold while it lasts
     shows: Callable[[Client], bool] = lambda bus: True  # besides the status; it is asked until it holds
     back_s: float = 20.0  # after its end: everything is well again
@@ -239,6 +240,19 @@ def slow_answers(bus: Client) -> bool:
     """Whether the diagnostics tell of slow answers."""
     said = newest(bus, "diagnostics/camera/ip1")
     return bool(said) and float(json.loads(said)["values"]["http_latency_ms"]) > 500
+
+
+def bad_snapshots(bus: Client) -> bool:
+    """Whether the diagnostics warn that the camera's snapshots are no pictures, and count them."""
+    said = newest(bus, "diagnostics/camera/ip1")
+    told = json.loads(said) if said else {"message": "", "level": 0, "values": {}}
+    return "no snapshot: " in told["message"] and told["level"] >= 1 and int(told["values"]["failed_snapshots"]) > 0
+
+
+def good_snapshots(bus: Client) -> bool:
+    """Whether the diagnostics have nothing to say against the camera's snapshots."""
+    said = newest(bus, "diagnostics/camera/ip1")
+    return bool(said) and "no snapshot: " not in json.loads(said)["message"]
 
 
 def stays_usable(bus: Client) -> None:
@@ -277,7 +291,7 @@ FAULTS = (
     Fault("slow", ("online", "degraded"), shows=slow_answers),
     Fault("silent_events", ("online",), shows=alarm_in_trouble),
     Fault("frozen_stream", ("degraded",)),
-    Fault("corrupt_jpeg", ("online", "degraded"), meanwhile=shows_no_half_picture),
+    Fault("corrupt_jpeg", ("online",), asked="snapshot/get", meanwhile=shows_no_half_picture, shows=bad_snapshots),
     Fault("nonce", ("online",), meanwhile=stays_usable),
     Fault("cut", ("offline",), shows=alarm_in_trouble),
     Fault("cut", ("offline",), {"refuses": True}, shows=alarm_in_trouble),
@@ -300,6 +314,8 @@ def fault(flat: SmallFlat, which: Fault, *, camera: str = "ip1") -> float:
         door.tell("fault", name=which.name, **which.settings)
         if which.also:
             door.tell(which.also)
+        if which.asked:
+            bus.say(f"camera/{camera}/{which.asked}", "now")
         try:
             wait(bus, lambda: state_of(bus, camera) in which.states and which.shows(bus), NOTICED_S, str(which))
             seconds = time.monotonic() - began
@@ -307,6 +323,8 @@ def fault(flat: SmallFlat, which: Fault, *, camera: str = "ip1") -> float:
         finally:
             door.tell("fault", name=which.name, on=False)
         well(flat, bus, camera, which.back_s)
+        bus.forget()
+        wait(bus, lambda: good_snapshots(bus), which.back_s, "no complaint about snapshots")
     assert flat.pid(f"camera-{camera}") == service, "it was restarted"
     return seconds
 

@@ -6,35 +6,38 @@ stream flows.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
-from typing import cast
+from contextlib import suppress
 
 from services.bus import Message
 from services.camera import orders
 from services.camera.health import Health
-from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.plan import Plan, attempt, wait
 from services.camera.requests import Away, FindStream, Picture, Refused, Reply, Snapshot, StreamAddress
 from services.camera.settings import Config
+from services.camera.upkeep import Facts
+from services.camera.video import pictures
 from services.camera.video.channel import Channel
 from services.camera.video.newest import Upright
+from services.camera.video.spoilt import Spoilt
 from services.errors import DeviceError
 from services.topics import CAMERA_SNAPSHOT
 
 START_S = 15.0  # an order to switch on fails when no picture has come until then
 STEP_S = 0.1
 IDLE_S = 1.0
-RETRY_S = 10.0  # after a camera would not tell where its stream is
-
-log = logging.getLogger(__name__)
+RETRY_S = 10.0  # after a camera would not tell where its stream is, or gave no picture
 
 
 class Feed:
     """Makes the plans. `channel` None: no moving pictures here (virtual time)."""
 
-    def __init__(self, config: Config, health: Health, channel: Channel | None, say: Callable[[Message], None]) -> None:
+    def __init__(
+        self, config: Config, health: Health, facts: Facts, channel: Channel | None, say: Callable[[Message], None]
+    ) -> None:
         self.config = config
         self.health = health
+        self.spoilt = Spoilt(config.name, facts)
         self.channel = channel
         self.upright = Upright(config.picture.flip, config.picture.mirror, config.kind)
         self.say = say
@@ -89,8 +92,7 @@ class Feed:
 
     def published(self) -> Plan[None]:
         """A snapshot for the bus, upright; DeviceError when there is none."""
-        reply = yield from ask(Snapshot())
-        data = self.upright.jpeg(cast(bytes, reply.result))
+        data = yield from self._upright()
         self.say(CAMERA_SNAPSHOT.message(data, cam=self.config.name))
 
     def at_motion(self, value: int) -> Plan[None]:
@@ -103,17 +105,26 @@ class Feed:
         """As long as the service: snapshots at the configured distance, while the camera is there and at rest."""
         while (every := self.config.snapshot.every_s) is not None:
             now = yield from wait(now + every)
-            if self.health.online and not self.health.moving:
-                try:
+            if self._has_time():
+                with suppress(DeviceError):
                     yield from self.published()
-                except DeviceError as error:
-                    log.info("%s: no snapshot this time: %s", self.config.name, error)
+
+    def mended(self, now: float) -> Plan[None]:
+        """As long as the service: another snapshot now and then after one that was none, until they are good again."""
+        while True:
+            now = yield from wait(now + RETRY_S)
+            if self.spoilt.why and self._has_time():
+                with suppress(DeviceError):
+                    yield from self._upright()
 
     def turned(self, picture: Picture) -> None:
         """The camera delivers its pictures in another way from now on."""
         self.upright = Upright(picture.flip, picture.mirror, self.upright.kind)
         if self.channel is not None:
             self.channel.newest.upright = self.upright
+
+    def _has_time(self) -> bool:
+        return self.health.online and not self.health.moving
 
     def _channel(self) -> Channel:
         if self.channel is None:
@@ -130,7 +141,7 @@ class Feed:
                 now = yield from self._find(channel)
             elif not channel.hopeful:
                 reply = yield from self._shoot(channel)
-                if reply.error is None:
+                if not self.spoilt.why:
                     return
                 now = yield from wait(reply.received + IDLE_S)
             if now > until:
@@ -144,12 +155,16 @@ class Feed:
             channel.begin(StreamAddress(None))
         return reply.received
 
+    def _upright(self) -> Plan[bytes]:
+        reply = yield from attempt(Snapshot())
+        return self.spoilt.judged(reply, self.upright.jpeg)
+
     def _shoot(self, channel: Channel) -> Plan[Reply]:
         self._shooting = True
         try:
             reply = yield from attempt(Snapshot())
         finally:
             self._shooting = False
-        if reply.error is None:
-            channel.show(cast(bytes, reply.result), reply.sent, reply.received)
+        with suppress(DeviceError):
+            channel.show(self.spoilt.judged(reply, pictures.whole), reply.sent, reply.received)
         return reply

@@ -16,7 +16,8 @@ from services.camera.requests import Away
 
 Image = NDArray[np.uint8]
 QUALITY = 80  # of the JPEGs that we make
-END, LONGEST_TAIL = b"\xff\xd9", 4096  # bytes that firmware writes behind the end
+BEGINNING, END = b"\xff\xd8", b"\xff\xd9"
+LONGEST_TAIL = 4096  # bytes that firmware writes behind the end
 
 
 def decode(jpeg: bytes) -> Image:
@@ -29,12 +30,22 @@ def decode_grey(jpeg: bytes) -> Image:
     return _decoded(jpeg, cv2.IMREAD_GRAYSCALE)
 
 
+def whole(jpeg: bytes) -> bytes:
+    """The same; Away when it lacks its beginning or its end. Of half a JPEG OpenCV makes a picture grey below."""
+    if not jpeg.startswith(BEGINNING) or END not in jpeg[-LONGEST_TAIL:]:
+        raise _no_picture(jpeg)
+    return jpeg
+
+
 def _decoded(jpeg: bytes, how: int) -> Image:
-    whole = END in jpeg[-LONGEST_TAIL:]  # of half a JPEG OpenCV makes a picture that is grey below
-    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), how) if whole else None
+    image = cv2.imdecode(np.frombuffer(whole(jpeg), np.uint8), how)
     if image is None:
-        raise Away(f"expected a whole JPEG, got {len(jpeg)} bytes that are none")
+        raise _no_picture(jpeg)
     return image.astype(np.uint8, copy=False)
+
+
+def _no_picture(data: bytes) -> Away:
+    return Away(f"expected a whole JPEG, got {len(data)} bytes that are none")
 
 
 def encode(image: Image, quality: int = QUALITY) -> bytes:

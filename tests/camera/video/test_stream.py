@@ -14,6 +14,7 @@ import httpx
 import numpy as np
 import pytest
 
+from services.bus import Message
 from services.camera.video import pictures
 from services.peers import free_port, wait_until
 from services.simulators import camera as simulated
@@ -181,6 +182,17 @@ def test_without_rtsp_the_cameras_mjpeg_is_handed_on_where_that_is_allowed(
         url = address(here, "RTSP")
         here.until(lambda: turning(here, lambda: first_picture(url)).shape == (396, 704, 3), 20)
         here.until(lambda: diagnostic(here)["message"] == "online", 5)
+
+
+def test_broken_snapshots_are_told_until_good_ones_come(tmp_path: Path, camera: simulated.Simulated) -> None:
+    with bench(tmp_path, camera) as here:
+        here.tell("fault", name="corrupt_jpeg", on=True)
+        here.inbox.put(Message("camera/ip1/snapshot/get", b"now", received=time.time()))
+        here.until(lambda: "no snapshot: expected a whole JPEG" in diagnostic(here)["message"], 15)
+        assert (diagnostic(here)["level"], diagnostic(here)["values"]["failed_snapshots"]) == (1, "1")
+        here.tell("fault", name="corrupt_jpeg", on=False)
+        here.until(lambda: diagnostic(here)["message"] == "online", 20)  # nobody has to ask again
+        assert not [one for one in here.said if one.topic == "camera/ip1/snapshot"]
 
 
 def test_a_stream_that_gives_no_picture_fails_the_order_and_stays_off(
