@@ -126,9 +126,7 @@ class CameraService:
         """Wakes the plans, and publishes what has changed."""
         if not self._polling:
             self._polling = True
-            feed = self.feed
-            plans = (self._poll(now), feed.run(now), feed.every_so_often(now), feed.mended(now), self.upkeep.plan(now))
-            for plan in plans:
+            for plan in (self._poll(now), *self.feed.lasting(now), self.upkeep.plan(now)):
                 self.stage.begin(plan, now, _nobody)
         self.early.tick(now)
         self.stage.tick(now)

@@ -6,7 +6,7 @@ stream flows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 from services.bus import Message
@@ -69,6 +69,10 @@ class Feed:
             channel.switch(rtsp=before[0] if order.rtsp else None, mjpeg=before[1] if order.mjpeg else None)
             raise
         return None
+
+    def lasting(self, now: float) -> Iterable[Plan[None]]:
+        """The plans that go on as long as the service does."""
+        return self.run(now), self.every_so_often(now), self.mended(now)
 
     def run(self, now: float) -> Plan[None]:
         """As long as the service: finds the stream when it is wanted, feeds those who look while none flows."""
