@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import signal
 import sys
+from dataclasses import asdict
 from json import dumps
 from pathlib import Path
 from typing import Annotated
@@ -141,6 +142,7 @@ def probe(
 ) -> None:
     """Meet a camera: find out what it is and how its firmware behaves, without harm; write its configuration."""
     from services.camera.probe import command  # HTTP, for this command alone
+    from services.simulators.camera.firmwares import PROFILES
 
     if url is not None:
         target = command.stranger(camera, url, user, secret_store.lookup())
@@ -149,7 +151,8 @@ def probe(
         if f"camera-{camera}" not in known:
             raise ConfigError([f"{config}:1: cameras: expected {camera!r} there, or its address with --url"])
         target = command.configured(camera, known[f"camera-{camera}"].config)
-    command.run(out, target, out_folder or Path(f"probe-{camera}"), yes_move=yes_move, json_only=json)
+    folder, firmwares = out_folder or Path(f"probe-{camera}"), {name: asdict(one) for name, one in PROFILES.items()}
+    command.run(out, target, folder, firmwares, yes_move=yes_move, json_only=json)
 
 
 app.command(epilog="Example: apartment order ip1 Goto Kitchen")(order.order)

@@ -20,8 +20,8 @@ import pytest
 import yaml
 from pydantic import SecretStr
 
-from services.camera.probe import anonymous, paper
-from services.camera.probe.contact import READS, contact
+from services.camera.probe import anonymous, likeness, paper, show
+from services.camera.probe.contact import MOVES, READS, contact
 from services.camera.probe.findings import Findings
 from services.camera.probe.stream import read_events
 from services.camera.probe.wire import Wire
@@ -43,6 +43,7 @@ UNSEEN = {  # switches that cannot be seen from outside, or only by doing harm
     "stream_slowdown_s", "tilt_acceleration", "zoom_acceleration", "zoom_speed",
 }  # fmt: skip
 MEASURED = {"latency_s": 0.06, "snapshot_s": 2.0, "tilt_share": 0.06}  # how far off they may be on a busy machine
+KNOWN = {name: asdict(profile) for name, profile in PROFILES.items()}
 NO_DIGEST = {"nonce", "challenge_spacing", "digest_algorithms", "qop", "realm"}  # where Basic is all there is
 
 
@@ -91,6 +92,7 @@ def meet(profile: str, may_move: bool) -> Meeting:
             wire.close()
         state = httpx.get(f"{camera.side_door_url}/state", timeout=30).json()
         asked = [entry["target"] for entry in httpx.get(f"{camera.side_door_url}/log", timeout=30).json()]
+        found.like = likeness.nearest(found.switches, KNOWN)
         files = dict(paper.recorded(found, wire))
         return Meeting(found, files, state, asked, camera.server.device.tables.changes)
 
@@ -130,6 +132,44 @@ def test_what_it_leaves_open_cannot_be_seen(profile: str, meeting: Meeting) -> N
     allowed |= {"unset_preset"} if true.preset_max <= 9 else set()  # all are stored
     allowed |= set() if true.position_abs == "full" else {"position_abs_tilt_off"}
     assert {one.name for one in fields(Profile)} - set(paper.switches(meeting.found)) <= allowed
+
+
+def test_it_says_which_firmware_it_is(profile: str, meeting: Meeting) -> None:
+    like = meeting.found.like
+    assert like is not None
+    assert (like.name, like.differs, like.known) == (profile, {}, True)
+    assert like.compared >= 25
+    assert show.likeness(like) == f"{profile}, in all {like.compared} ways that could be compared"
+    assert meeting.found.data()["like"]["name"] == profile
+
+
+def test_what_is_only_read_tells_which_firmware_it_is(profile: str, meeting: Meeting) -> None:
+    read = {key: value for key, value in meeting.found.switches.items() if key not in MOVES}
+    like = likeness.nearest(read, KNOWN)
+    assert like is not None
+    assert (like.name, like.differs) == (profile, {})
+
+
+def test_a_firmware_that_is_not_known_is_told_by_what_differs(profile: str, meeting: Meeting) -> None:
+    others = {name: switches for name, switches in KNOWN.items() if name != profile}
+    like = likeness.nearest(meeting.found.switches, others)
+    assert like is not None
+    true = PROFILES[profile]
+    for key, (seen, theirs) in like.differs.items():
+        assert seen == getattr(true, key) != theirs == getattr(PROFILES[like.name], key)
+    shown = show.likeness(like)
+    assert shown.startswith("no firmware that is known") is not like.known
+    assert like.name in shown
+    assert all(f"{key}: " in shown for key in like.differs)
+
+
+def test_a_family_of_its_own_is_no_firmware_that_is_known() -> None:
+    strange = {**KNOWN["sd2a-2023"], "auth": "basic", "realm": "mac"}
+    like = likeness.nearest(strange, {name: switches for name, switches in KNOWN.items() if name != "sd2a-2023"})
+    assert like is not None
+    assert not like.known
+    assert likeness.nearest({}, KNOWN) is None
+    assert likeness.nearest({"onvif": True}, {}) is None
 
 
 def test_speeds_are_those_of_the_motors(profile: str, meeting: Meeting) -> None:
@@ -362,6 +402,8 @@ def test_the_command_tells_each_step_and_leaves_its_papers(tmp_path: Path) -> No
     steps = [line for line in done.stdout.splitlines() if f"/{len(READS) + 1}]" in line]
     assert [line[1:3].strip() for line in steps] == [str(number) for number in range(1, len(READS) + 1)]
     assert "may be used again" in done.stdout
+    assert "ip3m-941w-2019" in done.stdout
+    assert json.loads((tmp_path / "probe-ip9" / "report.json").read_text())["like"]["name"] == "ip3m-941w-2019"
     files = [file for file in (tmp_path / "probe-ip9").rglob("*") if file.is_file()]
     assert {"ip9.yaml", "profile.yaml", "report.json"} <= {file.name for file in files}
     assert [file for file in files if PASSWORD in file.read_text()] == []

@@ -17,7 +17,7 @@ from rich.live import Live
 from rich.prompt import Confirm
 from rich.table import Table
 
-from services.camera.probe import paper, show
+from services.camera.probe import likeness, paper, show
 from services.camera.probe.contact import Teller, contact
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
@@ -65,12 +65,18 @@ def configured(name: str, settings: object) -> Target:
     return Target(name, settings.url, settings.user, settings.password)
 
 
-def run(out: Console, camera: Target, folder: Path, *, yes_move: bool, json_only: bool) -> Findings:
-    """Finds out, tells, and writes the papers into the folder. DeviceError when the camera cannot be asked."""
+def run(
+    out: Console, camera: Target, folder: Path, known: likeness.Known, *, yes_move: bool, json_only: bool
+) -> Findings:
+    """Finds out, tells, and writes the papers into the folder. DeviceError when the camera cannot be asked.
+
+    `known`: the firmwares that have a name, to say which of them it is like.
+    """
     quiet = Console(stderr=True, soft_wrap=True, highlight=False) if json_only else out
     wire = Wire(camera.url, camera.user, camera.password)
     with closing(wire), telling(quiet) as (teller, pause):
         found = contact(wire, teller, lambda found: yes_move or _asked(quiet, found, pause))
+    found.like = likeness.nearest(found.switches, known)
     files = paper.write(folder, found, wire, camera.name)
     if json_only:
         out.print_json(json.dumps(found.data()))

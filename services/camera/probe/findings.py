@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from services.camera.probe.likeness import Likeness
+
 
 @dataclass
 class Speed:
@@ -34,6 +36,7 @@ class Findings:
     delays_s: dict[str, float] = field(default_factory=dict)
     speeds: list[Speed] = field(default_factory=list)
     clock_off_s: float | None = None
+    like: Likeness | None = None  # which of the known firmwares
     pose: tuple[float, float, float] | None = None
     moved: bool = False
     notes: list[str] = field(default_factory=list)  # for the reader

@@ -16,6 +16,7 @@ from rich.text import Text
 
 from services.camera.probe.contact import MOVING, READS
 from services.camera.probe.findings import Findings
+from services.camera.probe.likeness import Likeness
 
 WORDS: dict[str, tuple[str, dict[object, str]]] = {  # switch -> what it is, and what its values mean
     "auth": ("Login", {"digest": "Digest", "basic": "Basic: the password travels readable", "digest+basic": "both"}),
@@ -158,6 +159,17 @@ def report(console: Console, found: Findings) -> None:
         console.print(f"Note: {note}.", markup=False)
 
 
+def likeness(like: Likeness | None) -> str:
+    """Which of the known firmwares it is, and where it differs from that."""
+    if like is None:
+        return "not compared"
+    if not like.differs:
+        return f"{like.name}, in all {like.compared} ways that could be compared"
+    which = like.name if like.known else f"no firmware that is known; the nearest is {like.name}"
+    rows = [f"  {key}: {seen} instead of {theirs}" for key, (seen, theirs) in like.differs.items()]
+    return "\n".join([f"{which}, but for {len(rows)} of {like.compared} ways:", *rows])
+
+
 def _head(found: Findings) -> Table:
     """Identity, capabilities and times."""
     can, table = found.capabilities, Table.grid(padding=(0, 2))
@@ -165,6 +177,7 @@ def _head(found: Findings) -> Table:
     rows: Iterable[tuple[str, str]] = (
         ("Address", found.url),
         ("Firmware", f"{found.firmware} ({found.built or 'date unknown'})"),
+        ("Behaves like", likeness(found.like)),
         ("Serial number", found.serial),
         ("Picture", ", ".join(_words(size, found.picture))),
         ("Looks at", where(found)),
