@@ -10,11 +10,12 @@ from services.camera.probe.likeness import Likeness
 
 @dataclass
 class Speed:
-    """How fast one axis turns at one level: degrees (or zoom levels) per second."""
+    """How fast one axis turns at one level, degrees per second; `doubt` is one standard deviation."""
 
     axis: str
     level: int
     per_s: float
+    doubt: float
 
 
 @dataclass
@@ -32,8 +33,8 @@ class Findings:
     switches: dict[str, Any] = field(default_factory=dict)  # how the firmware behaves
     capabilities: dict[str, Any] = field(default_factory=dict)  # what it can do
     picture: dict[str, Any] = field(default_factory=dict)  # how the picture is set
-    latency_ms: dict[str, float] = field(default_factory=dict)  # of requests: median, p95, worst
-    delays_s: dict[str, float] = field(default_factory=dict)
+    latency_ms: dict[str, float] = field(default_factory=dict)  # of requests: median, spread, p95, worst
+    delays_s: dict[str, float] = field(default_factory=dict)  # of motions; `reading`: how old one is when it comes
     speeds: list[Speed] = field(default_factory=list)
     clock_off_s: float | None = None
     like: Likeness | None = None  # which of the known firmwares

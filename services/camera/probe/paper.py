@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from itertools import pairwise
+from math import log, pow
 from pathlib import Path
 from typing import Any
 
 from services.camera.probe import anonymous
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
+
+LEVELS, SLOWEST = 8, 0.05  # speeds that there are; degrees/s, where one is so slow that it was hardly measured
 
 
 def section(found: Findings, name: str, user: str) -> str:
@@ -45,7 +49,10 @@ def profile(found: Findings) -> str:
     lines = [
         f"# {found.model} {found.firmware} as it was seen; not found out: {', '.join(found.unknown) or 'nothing'}."
     ]
-    lines += ["simulators:", "  camera:", "    switches:"]
+    lines += [f"# {note}" for note in _guessed(found)]
+    lines += ["simulators:", "  camera:"]
+    lines += [f"    profile: {found.like.name}"] if found.like and found.like.known else []
+    lines += ["    switches:"]
     lines += [f"      {key}: {json.dumps(value)}" for key, value in switches(found).items()]
     return "\n".join(lines) + "\n"
 
@@ -54,11 +61,41 @@ def switches(found: Findings) -> dict[str, Any]:
     """What a simulator's profile takes, in its own words."""
     known = {key: value for key, value in found.switches.items() if value is not None}
     seen = {"model": found.model, "firmware": found.firmware, "built": found.built, **known}
-    if "median" in found.latency_ms:
-        seen["latency_s"] = round(found.latency_ms["median"] / 1000, 3)
-    if "snapshot" in found.latency_ms:
-        seen["snapshot_s"] = round(found.latency_ms["snapshot"] / 1000, 3)
+    times = {"latency_s": "median", "latency_spread_s": "spread", "snapshot_s": "snapshot"}
+    seen |= {ours: round(found.latency_ms[told] / 1000, 3) for ours, told in times.items() if told in found.latency_ms}
+    if "reading" in found.delays_s:
+        seen["status_lag_s"] = found.delays_s["reading"]
+    if pan := _pan(found):
+        seen["pan_speeds"] = every_level(pan)
     return seen
+
+
+def every_level(measured: Mapping[int, float]) -> list[float]:
+    """Speeds 1 to 8 from two or more: on straight lines through these in logarithms of level and speed. Pure."""
+    known = sorted((level, max(speed, SLOWEST)) for level, speed in measured.items())
+    pieces = list(pairwise(known))
+
+    def at(level: int) -> float:
+        (low, slow), (high, fast) = next((piece for piece in pieces if level <= piece[1][0]), pieces[-1])
+        return slow * pow(level / low, log(fast / slow) / log(high / low))
+
+    return [round(at(level), 2) for level in range(1, LEVELS + 1)]
+
+
+def _pan(found: Findings) -> dict[int, float]:
+    return {one.level: one.per_s for one in found.speeds if one.axis == "pan"}
+
+
+def _guessed(found: Findings) -> list[str]:
+    """What in a profile is no measurement, for its reader."""
+    base = found.like.name if found.like and found.like.known else "the simulated camera's default"
+    pan = sorted(_pan(found))
+    if not pan:
+        return [f"Speeds were not measured: they, and what else is not said, are those of {base}."]
+    return [
+        f"pan_speeds: {', '.join(map(str, pan))} are measured, the others lie on lines through these (in logarithms).",
+        f"Accelerations and zoom were not measured: they, and what else is not said, are those of {base}.",
+    ]
 
 
 def recorded(found: Findings, wire: Wire) -> Mapping[str, str]:

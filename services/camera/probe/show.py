@@ -217,6 +217,7 @@ def _delays(delays_s: Mapping[str, float]) -> str:
     both = [axis for axis in ("pan", "tilt") if {f"{axis}_start", f"{axis}_stop"} <= set(delays_s)]
     words = "{} moves {:.2f} s after the order, stands {:.2f} s after the stop"
     told = [words.format(axis, delays_s[f"{axis}_start"], delays_s[f"{axis}_stop"]) for axis in both]
+    told += [f"a reading is {delays_s['reading']:.2f} s old"] if "reading" in delays_s else []
     return "\n".join(told) or "not tried"
 
 
@@ -226,6 +227,6 @@ def _speeds(found: Findings) -> Table:
     for axis in ("pan", "tilt"):
         table.add_column(f"{axis}, °/s", justify="right")
     for level in sorted({one.level for one in found.speeds}):
-        row = {one.axis: f"{one.per_s:.1f}" for one in found.speeds if one.level == level}
+        row = {one.axis: f"{one.per_s:.1f} ± {one.doubt:.1f}" for one in found.speeds if one.level == level}
         table.add_row(str(level), row.get("pan", ""), row.get("tilt", ""))
     return table

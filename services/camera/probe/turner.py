@@ -32,11 +32,13 @@ class Sample:
 
 @dataclass(frozen=True)
 class Run:
-    """Degrees turned (as the reading tells), seconds between the answers to start and stop, what was read on the way.
+    """Where it stood, degrees turned (as the reading tells), seconds between the answers to start and stop, and what
+    was read on the way.
 
     `settled`: seconds from sending the stop until the final reading came.
     """
 
+    before: Reading
     turned: float
     seconds: float
     seen: list[Sample]
@@ -111,7 +113,7 @@ class Turner:
         after = self.rest()
         self.samples += [(True, one) for one in moving(seen)]
         turned = difference(before, after.reading)[0 if direction.value[0] else 1]
-        return Run(turned, stopped.sent + stopped.seconds - begun_at, seen, self.stood_at - stopped.sent)
+        return Run(before, turned, stopped.sent + stopped.seconds - begun_at, seen, self.stood_at - stopped.sent)
 
 
 def moving(seen: list[Sample]) -> list[Sample]:

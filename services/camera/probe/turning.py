@@ -5,11 +5,12 @@ It moves by some degrees and back again. Whatever happens, a stop is the last co
 
 from __future__ import annotations
 
+from math import hypot, sqrt
 from statistics import median
 
 from services.camera.brands.dahua import ptz
 from services.camera.probe.findings import Findings, Speed
-from services.camera.probe.turner import STILL_DEG, Sample, Turner, apart, difference, moving
+from services.camera.probe.turner import STILL_DEG, Run, Sample, Turner, apart, difference, moving
 from services.camera.probe.wire import Exchange, Wire
 from services.camera.requests import Direction, MoveOver, MoveTo, Reading
 
@@ -19,6 +20,8 @@ NEAR_DEG = 0.5  # so near to where it was is back
 STEP_DEG = 3.0  # of the try with absolute positions
 COARSE_DEG = 4.0  # the way back begins faster than this
 RETURNS = 15
+READ_DEG, DITHER_DEG = 0.03, 0.08  # standard deviation of a reading in tenths; and where it trembles by one
+ACTS = 0.35  # of how late an answer is may fall after the camera has acted: what `ptz/pace` supposes, at most
 FAR_DEG = 12.0  # more than this is not what was asked for
 WATCHES, ALIKE = 100, 3  # readings; so many that are alike, and not those before it begins to turn
 BACK = {
@@ -78,11 +81,14 @@ def _speeds(turner: Turner, axis: str, direction: Direction) -> None:
         rate = (abs(second.turned) - abs(first.turned)) / max(second.seconds - first.seconds, 0.1)
         turner.rates[axis, level] = rate
         turner.grows[axis] = direction if first.turned > 0 else BACK[direction]
-        turner.found.speeds.append(Speed(axis, level, round(rate, 2)))
-        starts += begun(second.seen, rate)
+        doubt = _doubt(turner, rate) / max(second.seconds - first.seconds, 0.1)
+        turner.found.speeds.append(Speed(axis, level, round(rate, 2), round(doubt, 2)))
+        starts += begun(second, rate)
         turner.found.delays_s[f"{axis}_stop"] = round(second.settled, 2)
     if starts:
-        turner.found.delays_s[f"{axis}_start"] = round(median(starts), 2)
+        turner.found.delays_s[f"{axis}_start"] = round(max(0.0, median(starts)), 2)
+        half = turner.found.latency_ms["median"] / 2000
+        turner.found.delays_s["reading"] = round(max(0.0, starts[0] + half), 2)  # of the slower: it is soon that fast
     if axis == "pan":
         _sense(turner)
     else:
@@ -90,13 +96,23 @@ def _speeds(turner: Turner, axis: str, direction: Direction) -> None:
         turner.found.switches["tilt_share"] = round(median(shares), 2)
 
 
-def begun(seen: list[Sample], rate: float) -> list[float]:
-    """Seconds from the answer to a start until the reading changes, by a straight line through a sample. Pure."""
-    on = moving(seen)
+def begun(run: Run, rate: float) -> list[float]:
+    """Seconds from the answer to a start until the reading changes, by a straight line through a sample. Pure.
+
+    Less than none where a reading tells of a later time than the middle of its request.
+    """
+    on = moving(run.seen)
     if not on or rate < 2.0:
         return []  # too slow for tenths of degrees to tell
-    at = (on[-1].sent + on[-1].received) / 2 - apart(seen[0].reading, on[-1].reading) / rate
-    return [max(0.0, at - seen[0].sent)]
+    at = (on[-1].sent + on[-1].received) / 2 - apart(run.before, on[-1].reading) / rate
+    return [at - run.seen[0].sent]
+
+
+def _doubt(turner: Turner, rate: float) -> float:
+    """Standard deviation of degrees between two runs: of the readings at their ends, and of when each of them acted."""
+    dithers = turner.found.switches["status_dither"]
+    spread = turner.found.latency_ms["spread"] / 1000
+    return hypot(2 * (DITHER_DEG if dithers else READ_DEG), 2 * rate * ACTS * spread / sqrt(3))
 
 
 def _sense(turner: Turner) -> None:
