@@ -5,19 +5,14 @@ from __future__ import annotations
 from math import hypot
 from typing import Any
 
-import httpx
 import pytest
 import yaml
-from pydantic import SecretStr
 
 from services.camera.probe import paper
-from services.camera.probe.contact import contact
 from services.camera.probe.findings import Findings
-from services.camera.probe.wire import Wire
 from services.simulators import camera as simulated
 from services.simulators.camera.program import inside
-from services.virtual import wire as virtual
-from tests.camera.bench import PASSWORD, SHIPPED
+from tests.camera.first_contact import Network, config, probed
 
 DOUBTS = 3.0  # standard deviations
 CAMERAS: dict[str, dict[str, Any]] = {
@@ -27,41 +22,6 @@ CAMERAS: dict[str, dict[str, Any]] = {
     "late": {"switches": {"latency_s": 0.2, "latency_spread_s": 0.02, "status_lag_s": 0.5}},
     "fresh": {"switches": {"status_lag_s": 0.0, "latency_spread_s": 0.2}},
 }
-
-
-class Silent:
-    """A Teller that says nothing."""
-
-    def begin(self, step: str) -> None:
-        pass
-
-    def detail(self, text: str) -> None:
-        pass
-
-    def end(self, step: str, found: Findings) -> None:
-        pass
-
-
-class Network(virtual.Wire):
-    """Virtual time without an event stream, which would not end."""
-
-    def handle_request(self, request: httpx.Request) -> httpx.Response:
-        if b"action=attach" in request.url.query:
-            return httpx.Response(503)
-        return super().handle_request(request)
-
-    def pause(self, seconds: float) -> None:
-        self.now += seconds
-
-
-def config(**values: Any) -> simulated.Config:
-    return simulated.Config.model_validate({"folder": SHIPPED, "user": "ros", "password": PASSWORD, **values})
-
-
-def probed(network: Network, *, may_move: bool = True) -> tuple[Findings, Wire]:
-    wire = Wire("http://camera", "ros", SecretStr(PASSWORD), clock=lambda: network.now, pause=network.pause)
-    wire.http = httpx.Client(base_url=wire.url, transport=network)
-    return contact(wire, Silent(), lambda found: may_move), wire
 
 
 def stand_in(found: Findings) -> simulated.Config:

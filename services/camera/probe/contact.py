@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from services.camera.probe import firmware, login, onvif, stream, turning
+from services.camera.probe import firmware, login, onvif, rights, stream, turning
 from services.camera.probe.findings import Findings
-from services.camera.probe.wire import Wire
+from services.camera.probe.wire import NoRight, Wire
 
 Ask = Callable[[Wire, Findings], None]
 READS: tuple[tuple[str, Ask], ...] = (
@@ -61,13 +61,26 @@ def contact(wire: Wire, teller: Teller, may_move: Callable[[Findings], bool]) ->
         return found
     for step, ask in READS[1:]:
         _take(step, ask, wire, found, teller)
-    if may_move(found):
-        _take(MOVING, turning.turn, wire, found, teller)
-    else:
-        found.unknown |= {switch: "only a moving camera shows it" for switch in MOVES if switch not in found.switches}
+    if why := _still(wire, found, teller, may_move):
+        found.unknown |= {switch: why for switch in MOVES if switch not in found.switches}
+    found.rights = rights.told(wire.exchanges)
     if wire.odd:
         found.notes.append(f"it refused a good login {wire.odd} times in {len(wire.exchanges)} requests")
     return found
+
+
+def _still(wire: Wire, found: Findings, teller: Teller, may_move: Callable[[Findings], bool]) -> str:
+    """Lets it move, with leave; why it did not."""
+    if not found.switches.get("ptz_channels"):
+        return "the account has no right to ask the motors"
+    if not may_move(found):
+        return "only a moving camera shows it"
+    try:
+        _take(MOVING, turning.turn, wire, found, teller)
+    except NoRight as error:
+        found.moved = False
+        return str(error)
+    return ""
 
 
 def _take(step: str, ask: Ask, wire: Wire, found: Findings, teller: Teller) -> None:

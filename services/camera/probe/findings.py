@@ -40,6 +40,7 @@ class Findings:
     like: Likeness | None = None  # which of the known firmwares
     pose: tuple[float, float, float] | None = None
     moved: bool = False
+    rights: dict[str, bool | None] = field(default_factory=dict)  # what the account may; None: not tried
     notes: list[str] = field(default_factory=list)  # for the reader
     unknown: dict[str, str] = field(default_factory=dict)  # switch -> why it was not found out
 

@@ -18,6 +18,7 @@ CONFIG = "/cgi-bin/configManager.cgi?action=getConfig&name="
 NARROW = "VideoInOptions[0]"
 SNAPSHOTS = 3  # tries: some are dropped now and then
 ASKED = 20  # status readings for the latency
+NO_RIGHT = "the account has no right to ask for it"
 CLOCK = "/cgi-bin/global.cgi?action=getCurrentTime"
 
 
@@ -50,6 +51,9 @@ def read_error_style(answer: Exchange) -> str | None:
 def brackets(wire: Wire, found: Findings) -> None:
     """Whether `[0]` may be sent as it is and as %5B0%5D, and whether a part of a table can be asked for."""
     whole = wire.ask(f"{CONFIG}VideoInOptions", "VideoInOptions")
+    if whole.denied:
+        found.unknown |= dict.fromkeys(("brackets", "config_narrowing", "daynight", "lens_mask"), NO_RIGHT)
+        return
     raw = wire.ask(f"{CONFIG}{NARROW}", "VideoInOptions part")
     encoded = wire.ask(f"{CONFIG}{NARROW.replace('[', '%5B').replace(']', '%5D')}", "VideoInOptions part, encoded")
     taken = (raw.good, encoded.good)
@@ -68,16 +72,22 @@ def _daynight(wire: Wire, found: Findings, options: Exchange) -> None:
     elif "DayNightColor" in options.text:
         found.switches["daynight"] = "VideoInOptions"
     mask = wire.ask(f"{CONFIG}LeLensMask", "LeLensMask")
-    found.switches["lens_mask"] = found.capabilities["privacy"] = "LeLensMask" in mask.text
+    if mask.denied:
+        found.unknown["lens_mask"] = NO_RIGHT
+    else:
+        found.switches["lens_mask"] = found.capabilities["privacy"] = "LeLensMask" in mask.text
 
 
 def channels(wire: Wire, found: Findings) -> None:
     """The channel of the motors, and the form in which they tell where they stand."""
     answers = {channel: wire.ask(ptz.status(channel), f"status of channel {channel}") for channel in (0, 1)}
     good = {channel: answer for channel, answer in answers.items() if answer.good and _position_key(answer.text)}
-    found.switches["ptz_channels"] = tuple(good)
+    if not good and any(answer.denied for answer in answers.values()):
+        found.unknown |= dict.fromkeys(("ptz_channels", "status_form", "position_key"), NO_RIGHT)
+        return
     if not good:
-        raise Refused("the camera tells its position on neither channel 1 nor 0: it has no motors, or no right to them")
+        raise Refused("the camera tells its position on neither channel 1 nor 0: it has no motors")
+    found.switches["ptz_channels"] = tuple(good)
     body = next(reversed(good.values())).text
     found.switches |= {"status_form": status_form(body), "position_key": _position_key(body)}
     reading = ptz.read_status(body)
@@ -90,6 +100,9 @@ def _position_key(body: str) -> str | None:
 
 def latency(wire: Wire, found: Findings) -> None:
     """How long control requests take, and whether a camera at rest says so."""
+    if not found.switches.get("ptz_channels"):
+        found.latency_ms = times([wire.ask(system.magic("getDeviceType")).seconds for _ in range(ASKED)])
+        return
     channel = found.switches["ptz_channels"][-1]
     words: set[str] = set()
     readings: set[tuple[float, float]] = set()
@@ -118,7 +131,16 @@ def _ms(seconds: float) -> float:
 
 def capabilities(wire: Wire, found: Findings) -> None:
     """What it says that it can do, and what it does not refuse when asked for nothing."""
-    channel = found.switches["ptz_channels"][-1]
+    if channels := found.switches.get("ptz_channels"):
+        _motors(wire, found, channels[-1])
+    for kind in ("Input", "Output"):
+        count = read_table(wire.ask(f"/cgi-bin/devAudio{kind}.cgi?action=getCollect", f"audio {kind.lower()}s").text)
+        found.capabilities[f"audio_{kind[:-3].lower()}"] = int(count.get("result", "0") or "0")
+    events = wire.ask("/cgi-bin/eventManager.cgi?action=getEventIndexes&code=VideoMotion", "getEventIndexes")
+    found.capabilities["motion_events"] = events.good or events.text.startswith("Error: No Events")
+
+
+def _motors(wire: Wire, found: Findings, channel: int) -> None:
     caps = wire.ask(f"/cgi-bin/ptz.cgi?action=getCurrentProtocolCaps&channel={channel}", "getCurrentProtocolCaps")
     found.capabilities |= read_capabilities(read_table(caps.text))
     found.switches["preset_max"] = found.capabilities.get("presets")
@@ -128,11 +150,6 @@ def capabilities(wire: Wire, found: Findings) -> None:
         found.switches["presets_form"] = "long" if any(key.endswith(".Type") for key in stored) else "short"
     numbers = (value for key, value in stored.items() if key.endswith(".Index") and value.isdigit())
     found.capabilities["presets_stored"] = sorted(map(int, numbers))
-    for kind in ("Input", "Output"):
-        count = read_table(wire.ask(f"/cgi-bin/devAudio{kind}.cgi?action=getCollect", f"audio {kind.lower()}s").text)
-        found.capabilities[f"audio_{kind[:-3].lower()}"] = int(count.get("result", "0") or "0")
-    events = wire.ask("/cgi-bin/eventManager.cgi?action=getEventIndexes&code=VideoMotion", "getEventIndexes")
-    found.capabilities["motion_events"] = events.good or events.text.startswith("Error: No Events")
 
 
 def read_capabilities(table: Mapping[str, str]) -> dict[str, Any]:

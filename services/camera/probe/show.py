@@ -14,6 +14,7 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
+from services.camera.probe import rights
 from services.camera.probe.contact import MOVING, READS
 from services.camera.probe.findings import Findings
 from services.camera.probe.likeness import Likeness
@@ -123,7 +124,9 @@ def gist(step: str, found: Findings) -> str:
 
 def where(found: Findings) -> str:
     """Where it looks, in words."""
-    pan, tilt, zoom = found.pose or (0.0, 0.0, 0.0)
+    if found.pose is None:
+        return "not told"
+    pan, tilt, zoom = found.pose
     return f"pan {pan:.1f}°, tilt {tilt:.1f}°, zoom {zoom:g}"
 
 
@@ -179,6 +182,7 @@ def _head(found: Findings) -> Table:
         ("Firmware", f"{found.firmware} ({found.built or 'date unknown'})"),
         ("Behaves like", likeness(found.like)),
         ("Serial number", found.serial),
+        ("The account", rights.words(found.rights) if found.rights else "not asked"),
         ("Picture", ", ".join(_words(size, found.picture))),
         ("Looks at", where(found)),
         ("Presets", f"{can.get('presets', 'unknown')}, of them stored {len(can.get('presets_stored', ()))}"),

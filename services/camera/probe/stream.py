@@ -44,6 +44,8 @@ def listen(wire: Wire, target: str, clock: Callable[[], float]) -> bytes:
                     break
         except httpx.ReadTimeout:
             pass  # silence: that is an answer too
+    if body.startswith(b"Error"):
+        raise Away(f"the event stream was refused: {' '.join(body[:60].decode('latin-1').split())}")
     return body
 
 

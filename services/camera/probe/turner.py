@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from services.camera.brands.dahua import ptz
 from services.camera.brands.dahua.replies import read_table
 from services.camera.probe.findings import Findings
-from services.camera.probe.wire import Exchange, Wire
+from services.camera.probe.wire import Exchange, NoRight, Wire
 from services.camera.requests import Away, Direction, Reading, Refused, Start
 
 STILL_DEG = 0.15  # readings nearer than this are the same
@@ -81,15 +81,19 @@ class Turner:
 
     @contextmanager
     def turning(self, direction: Direction, speed: int) -> Iterator[Exchange]:
-        """Runs as long as the block does; the stop is sent until it is confirmed."""
+        """Runs as long as the block does; the stop is sent until it is confirmed. NoRight: nothing was started."""
+        denied = False
         try:
             started = self.wire.ask(ptz.start(Start(direction, speed, speed), self.channel), "start")
             self.resting = None
+            if denied := started.denied:
+                raise NoRight("the account has no right to turn it")
             if not started.good:
                 raise Refused(f"the camera refuses to turn: {started.status} {started.text[:60]!r}")
             yield started
         finally:
-            self.stop(direction)
+            if not denied:
+                self.stop(direction)
 
     def stop(self, direction: Direction) -> None:
         """Ends that motion for sure."""

@@ -15,13 +15,17 @@ from dataclasses import dataclass, field
 import httpx
 from pydantic import SecretStr
 
-from services.camera.requests import Away, BadLogin, Locked
+from services.camera.requests import Away, BadLogin, Locked, Refused
 from services.camera.web.digest import Challenge, authorization, read_challenge
 
 ANSWER = httpx.Timeout(8.0, connect=3.0)
 PICTURE = httpx.Timeout(25.0, connect=3.0)
 ODD_S = 0.5  # an odd refusal of a valid login is over after so long
 ODD_TRIES = 4
+
+
+class NoRight(Refused):
+    """The account may log in, but not do that."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,11 @@ class Exchange:
     def good(self) -> bool:
         """Whether the camera did as asked: 200, and no word of an error."""
         return self.status == 200 and not self.text[:40].lstrip().startswith("Error")
+
+    @property
+    def denied(self) -> bool:
+        """Whether it knows the account, which has no right to this."""
+        return "Invalid Authority" in self.text[:200]
 
     @property
     def challenges(self) -> list[str]:
@@ -93,7 +102,7 @@ class Wire:
             answer = self._send(
                 target, name, {"Authorization": self._authorization("GET", target, self.challenge)}, timeout
             )
-            if answer.status != 401 or "Invalid Authority" in answer.text:
+            if answer.status != 401 or answer.denied:
                 self.proven = True
                 return answer
             self._refused(answer)
@@ -111,7 +120,7 @@ class Wire:
                 challenge = self._read(self.bare(target))
                 headers = {"Authorization": self._authorization("GET", target, challenge)}
                 with self.http.stream("GET", target, headers=headers, timeout=httpx.Timeout(silence_s)) as response:
-                    if response.status_code != 401 or not left:
+                    if response.status_code != 401 or not left or b"Invalid Authority" in response.read():
                         yield response
                         return
                 self.odd += 1
