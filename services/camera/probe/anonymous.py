@@ -38,6 +38,6 @@ def recorded(exchanges: Iterable[Exchange], clean: Callable[[str], str]) -> dict
             continue
         head = "".join(f"{key}: {value}\r\n" for key, value in one.headers if key.lower() in KEPT)
         body = PICTURE.decode("latin-1") if one.body.startswith(b"\xff\xd8") else one.body.decode("latin-1")
-        text = f"GET {one.target}\r\nHTTP/1.1 {one.status}\r\n{head}\r\n{body}"
+        text = f"{one.method} {one.target}\r\nHTTP/1.1 {one.status}\r\n{head}\r\n{body}"
         files[f"{re.sub(r'[^a-z0-9]+', '_', one.name.lower()).strip('_')}.txt"] = clean(text)
     return files

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from services.camera.brands.dahua import ptz, system
-from services.camera.brands.dahua.capabilities import status_form
+from services.camera.brands.dahua import errands, ptz, system
+from services.camera.brands.dahua.capabilities import EVENTS, status_form
 from services.camera.brands.dahua.replies import read_table
 from services.camera.probe.findings import Findings, share
 from services.camera.probe.wire import PICTURE, Exchange, Wire
@@ -20,6 +20,7 @@ SNAPSHOTS = 3  # tries: some are dropped now and then
 ASKED = 20  # status readings for the latency
 NO_RIGHT = "the account has no right to ask for it"
 CLOCK = "/cgi-bin/global.cgi?action=getCurrentTime"
+ALSO = {"events getCaps": EVENTS, "storage": errands.STORAGE, "VideoColor": f"{CONFIG}VideoColor"}  # for the fixtures
 
 
 def identity(wire: Wire, found: Findings) -> None:
@@ -131,13 +132,15 @@ def _ms(seconds: float) -> float:
 
 def capabilities(wire: Wire, found: Findings) -> None:
     """What it says that it can do, and what it does not refuse when asked for nothing."""
-    if channels := found.switches.get("ptz_channels"):
-        _motors(wire, found, channels[-1])
+    if motors := found.switches.get("ptz_channels"):
+        _motors(wire, found, motors[-1])
     for kind in ("Input", "Output"):
         count = read_table(wire.ask(f"/cgi-bin/devAudio{kind}.cgi?action=getCollect", f"audio {kind.lower()}s").text)
         found.capabilities[f"audio_{kind[:-3].lower()}"] = int(count.get("result", "0") or "0")
     events = wire.ask("/cgi-bin/eventManager.cgi?action=getEventIndexes&code=VideoMotion", "getEventIndexes")
     found.capabilities["motion_events"] = events.good or events.text.startswith("Error: No Events")
+    for name, target in ALSO.items():
+        wire.ask(target, name)
 
 
 def _motors(wire: Wire, found: Findings, channel: int) -> None:
@@ -180,7 +183,7 @@ def pictures(wire: Wire, found: Findings) -> None:
     for channel in (None, 0, 1):
         query = "" if channel is None else f"?channel={channel}"
         for _ in range(SNAPSHOTS):
-            answer = wire.ask(f"/cgi-bin/snapshot.cgi{query}", "snapshot", PICTURE)
+            answer = wire.ask(f"/cgi-bin/snapshot.cgi{query}", f"snapshot {query}", PICTURE)
             if answer.body.startswith(b"\xff\xd8"):
                 break
         if answer.body.startswith(b"\xff\xd8"):

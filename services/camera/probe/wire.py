@@ -39,6 +39,7 @@ class Exchange:
     body: bytes = b""
     sent: float = 0.0
     seconds: float = 0.0
+    method: str = "GET"
 
     @property
     def text(self) -> str:
@@ -166,9 +167,8 @@ class Wire:
         timeout: httpx.Timeout = ANSWER,
         body: bytes | None = None,
     ) -> Exchange:
-        sent = self.clock()
+        sent, method = self.clock(), "GET" if body is None else "POST"
         try:
-            method = "GET" if body is None else "POST"
             response = self.http.request(method, target, headers=headers, timeout=timeout, content=body)
         except httpx.TransportError as error:
             exchange = Exchange(name, target, 0, body=type(error).__name__.encode(), sent=sent)
@@ -177,6 +177,6 @@ class Wire:
         else:
             spelled = tuple((key.decode("latin-1"), value.decode("latin-1")) for key, value in response.headers.raw)
             took = self.clock() - sent
-            exchange = Exchange(name, target, response.status_code, spelled, response.content, sent, took)
+            exchange = Exchange(name, target, response.status_code, spelled, response.content, sent, took, method)
         self.exchanges.append(exchange)
         return exchange
