@@ -53,6 +53,7 @@ class Turner:
         self.channel: int = found.switches["ptz_channels"][-1]
         self.samples: list[tuple[bool, Sample]] = []  # whether it must have been moving
         self.rates: dict[tuple[str, int], float] = {}
+        self.starts: list[float] = []  # one of each axis: seconds from the answer to a start until the reading changes
         self.grows: dict[str, Direction] = {}  # which way the reading grows
         self.resting: Sample | None = None  # where it stands, as long as nothing was started
         self.stood_at = 0.0  # when the first of the readings came that show it at rest

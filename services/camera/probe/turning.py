@@ -6,7 +6,7 @@ It moves by some degrees and back again. Whatever happens, a stop is the last co
 from __future__ import annotations
 
 from math import hypot, sqrt
-from statistics import median
+from statistics import fmean, median
 
 from services.camera.brands.dahua import ptz
 from services.camera.probe.findings import Findings, Speed
@@ -87,8 +87,9 @@ def _speeds(turner: Turner, axis: str, direction: Direction) -> None:
         turner.found.delays_s[f"{axis}_stop"] = round(second.settled, 2)
     if starts:
         turner.found.delays_s[f"{axis}_start"] = round(max(0.0, median(starts)), 2)
+        turner.starts.append(starts[0])  # of the slower: it is soon that fast
         half = turner.found.latency_ms["median"] / 2000
-        turner.found.delays_s["reading"] = round(max(0.0, starts[0] + half), 2)  # of the slower: it is soon that fast
+        turner.found.delays_s["reading"] = round(max(0.0, fmean(turner.starts) + half), 2)
     if axis == "pan":
         _sense(turner)
     else:
