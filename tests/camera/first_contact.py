@@ -45,6 +45,6 @@ def config(**values: Any) -> simulated.Config:
 
 
 def probed(network: Network, *, may_move: bool = True) -> tuple[Findings, Wire]:
-    wire = Wire("http://camera", "ros", SecretStr(PASSWORD), clock=lambda: network.now, pause=network.pause)
+    wire = Wire("http://127.0.0.1", "ros", SecretStr(PASSWORD), clock=lambda: network.now, pause=network.pause)
     wire.http = httpx.Client(base_url=wire.url, transport=network)
     return contact(wire, Silent(), lambda found: may_move), wire

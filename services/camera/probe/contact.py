@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from services.camera.probe import firmware, login, onvif, rights, stream, turning
+from services.camera.probe import firmware, login, onvif, rights, stream, turning, video
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import NoRight, Wire
 
@@ -23,6 +23,7 @@ READS: tuple[tuple[str, Ask], ...] = (
     ("Snapshots", firmware.pictures),
     ("Events", stream.events),
     (onvif.STEP, firmware.onvif),
+    (video.STEP, video.look),
 )
 MOVING = "Speeds, delays and directions"
 MOVES = (

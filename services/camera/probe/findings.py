@@ -40,6 +40,8 @@ class Findings:
     like: Likeness | None = None  # which of the known firmwares
     pose: tuple[float, float, float] | None = None
     moved: bool = False
+    rtsp_port: int | None = None  # as it says
+    streams: dict[str, str] = field(default_factory=dict)  # main and sub: codec and size of those that it delivers
     rights: dict[str, bool | None] = field(default_factory=dict)  # what the account may; None: not tried
     notes: list[str] = field(default_factory=list)  # for the reader
     unknown: dict[str, str] = field(default_factory=dict)  # switch -> why it was not found out

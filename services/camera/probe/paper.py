@@ -11,6 +11,7 @@ from typing import Any
 
 from services.camera.probe import anonymous
 from services.camera.probe.findings import Findings
+from services.camera.probe.video import USUAL_PORT
 from services.camera.probe.wire import Wire
 
 LEVELS, SLOWEST = 8, 0.05  # speeds that there are; degrees/s, where one is so slow that it was hardly measured
@@ -35,6 +36,7 @@ def section(found: Findings, name: str, user: str) -> str:
     if {"flip", "mirror"} <= set(found.picture):
         flip, mirror = (str(found.picture[key]).lower() for key in ("flip", "mirror"))
         lines.append(f"    picture: {{flip: {flip}, mirror: {mirror}}}")
+    lines += _streams(found)
     lines += [
         f"    tilt_range: [{tilt[0]:g}, {tilt[1]:g}]                   # {measured}",
         "    pan_dead_arc: [179, 186]                # not measured: what siblings of this camera have",
@@ -42,6 +44,16 @@ def section(found: Findings, name: str, user: str) -> str:
         "    # mount, camera_info, markers: see config/apartment.yaml; a scan needs them",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _streams(found: Findings) -> list[str]:
+    """Where its moving pictures are, as far as that is not what the service supposes."""
+    lines = [f"    rtsp_port: {found.rtsp_port}"] if found.rtsp_port not in (None, USUAL_PORT) else []
+    if found.streams and "sub" not in found.streams:
+        lines.append("    stream: {source: main}                  # the sub stream did not come")
+    if found.rtsp_port is not None and not found.streams:
+        lines.append(f"    # no moving pictures over RTSP: {found.unknown.get('sub stream', 'not tried')}")
+    return lines
 
 
 def profile(found: Findings) -> str:

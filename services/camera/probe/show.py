@@ -115,6 +115,7 @@ def gist(step: str, found: Findings) -> str:
         READS[9][0]: lambda: "{} x {} pixels".format(*found.picture["size"]),
         READS[10][0]: lambda: meaning("heartbeat", told),
         READS[11][0]: lambda: meaning("onvif", told),
+        READS[12][0]: lambda: streams(found),
         MOVING: lambda: ", ".join(f"{one.axis} {one.per_s:.1f}°/s at {one.level}" for one in found.speeds[2::3]),
     }.get(step)
     with suppress(KeyError, TypeError, IndexError):
@@ -162,6 +163,13 @@ def report(console: Console, found: Findings) -> None:
         console.print(f"Note: {note}.", markup=False)
 
 
+def streams(found: Findings) -> str:
+    """What comes over RTSP, or why nothing does."""
+    each = {name: found.streams.get(name) or found.unknown.get(f"{name} stream") for name in ("main", "sub")}
+    told = "; ".join(f"{name} {text}" for name, text in each.items() if text)
+    return f"RTSP on port {found.rtsp_port}: {told}" if told else "not tried"
+
+
 def likeness(like: Likeness | None) -> str:
     """Which of the known firmwares it is, and where it differs from that."""
     if like is None:
@@ -184,6 +192,7 @@ def _head(found: Findings) -> Table:
         ("Serial number", found.serial),
         ("The account", rights.words(found.rights) if found.rights else "not asked"),
         ("Picture", ", ".join(_words(size, found.picture))),
+        ("Moving pictures", streams(found)),
         ("Looks at", where(found)),
         ("Presets", f"{can.get('presets', 'unknown')}, of them stored {len(can.get('presets_stored', ()))}"),
         ("Sound", f"{can.get('audio_in', 0)} microphone(s), {can.get('audio_out', 0)} loudspeaker(s)"),

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 from services.bus import Message
 from services.camera.address import Address
-from services.camera.requests import BadLogin, StreamAddress
+from services.camera.requests import StreamAddress
 from services.camera.video import pictures
 from services.camera.video.newest import Newest, Upright
 from services.camera.video.proxy import Proxy
@@ -189,16 +189,9 @@ class Channel:
         return tuple(ways)
 
     def _rtsp(self, url: str) -> Session:
-        from services.camera.video.rtsp import Rtsp  # FFmpeg takes 30 MB: not while the stream is off
+        from services.camera.video import rtsp  # FFmpeg takes 30 MB: not while the stream is off
 
-        with self.gate.login() as login:
-            try:
-                session = Rtsp(url, self.address, self.clock)
-            except BadLogin:
-                login.failed()
-                raise
-            login.passed()
-            return session
+        return rtsp.opened(url, self.address, self.gate, self.clock)
 
     def _own_url(self, proxy: Proxy) -> str:
         host = str(proxy.server_address[0])

@@ -20,6 +20,7 @@ from services.camera.requests import Away, BadLogin, Refused
 from services.camera.video.pictures import Image
 from services.camera.video.session import Arrival
 from services.camera.video.timing import Held
+from services.camera.web.gate import Gate
 from services.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -34,6 +35,18 @@ OPTIONS = {
     "probesize": "32",  # what kind of picture it is stands in the session description
     "analyzeduration": "0",
 }
+
+
+def opened(url: str, address: Address, gate: Gate, clock: Callable[[], float] = time.time) -> Rtsp:
+    """A session, with the login that the camera's gate allows. BadLogin, Refused or Away."""
+    with gate.login() as login:
+        try:
+            session = Rtsp(url, address, clock)
+        except BadLogin:
+            login.failed()
+            raise
+        login.passed()
+        return session
 
 
 class Rtsp:
@@ -63,6 +76,11 @@ class Rtsp:
         frame, broken = self._decode() if decode else (None, False)
         develop = None if frame is None else _developer(frame)
         return Arrival(arrived, packet.size, stream_s, develop, broken=broken)
+
+    @property
+    def codec(self) -> str:
+        """How its pictures are coded."""
+        return self._stream.codec_context.name
 
     def close(self) -> None:
         """Ends the connection."""
