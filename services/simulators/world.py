@@ -29,6 +29,8 @@ from services.vision.frames import (
     rotation_z,
 )
 
+LAMP_LUX = 200.0  # a living room in the evening
+
 
 class Room(Section):
     """A part of the apartment; `polygon` holds its corners, in order. Open areas have edges without a wall."""
@@ -148,6 +150,7 @@ class WorldMap(Section):
 class World(Section):
     """Everything that stands, hangs or lies in the apartment."""
 
+    light: float = Field(default=LAMP_LUX, ge=0, le=100_000)  # lux, everywhere
     rooms: dict[str, Room]
     walls: tuple[Wall, ...]
     furniture: tuple[Furniture, ...] = ()

@@ -20,7 +20,7 @@ class Tables:
     """The tables of one camera.
 
     `changes` grows with every write, `encoders` with those that restart the encoders, `looks` with those that change
-    how the picture is taken; `exposed_at` is when the last of these was.
+    how the picture is taken, and with the light; `exposed_at` is when the last of these was.
     """
 
     def __init__(self, profile: Profile, lens: Lens) -> None:
@@ -46,10 +46,14 @@ class Tables:
         looks = any(_exposes(key) and self._values[key] != value for key, value in known.items())
         self._values |= known
         if looks:
-            self.looks, self.exposed_at = self.looks + 1, now
+            self.expose(now)
         self.changes += bool(known)
         self.encoders += any(key.startswith("Encode[") for key in known)
         return True
+
+    def expose(self, now: float) -> None:
+        """The picture has changed as a whole, so that the camera exposes anew."""
+        self.looks, self.exposed_at = self.looks + 1, now
 
     def fix(self, key: str, value: str) -> None:
         """What the camera knows of itself."""

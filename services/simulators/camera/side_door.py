@@ -9,6 +9,7 @@ POST /pose     {"pan", "tilt", "zoom"}   any may be left out; the motors stand t
 POST /event    {"code", "action", "index", "data"}
 POST /stir     {"seconds"}               something moves before the lens for so long
 POST /board    {"name", ...}             somebody holds a board of squares so (`board.py`); a name alone: puts it away
+POST /light    {"lux"}                   how bright the rooms are from now on
 POST /tone     {"hertz"}                 what the microphone hears
 POST /clock    {"offset_s", "drift_ppm"} the camera's clock is wrong by so much, and gains so many us/s
 POST /card     {"in"}                    whether a memory card is in it
@@ -26,6 +27,7 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 from http.server import BaseHTTPRequestHandler
+from math import inf
 from typing import Any
 
 from services.simulators.board import HeldBoard
@@ -50,6 +52,7 @@ def state(camera: CameraServer) -> dict[str, Any]:
         "presets": {number: name for number, (name, _) in camera.device.ptz.presets.items()},
         "door": camera.door.counters,
         "listeners": camera.device.events.listeners,
+        "lux": camera.pictures.lux,
         **camera.pictures.rates(),
     }
 
@@ -80,6 +83,13 @@ def _stir(camera: CameraServer, order: dict[str, Any]) -> None:
 def _board(camera: CameraServer, order: dict[str, Any]) -> None:
     name = str(order.pop("name", "board"))
     camera.pictures.hold(name, HeldBoard.model_validate(order) if order else None)
+
+
+def _light(camera: CameraServer, order: dict[str, Any]) -> None:
+    lux = float(order["lux"])
+    if not 0.0 <= lux < inf:
+        raise ValueError(f"expected 0 or more, got {lux}")
+    camera.pictures.shine(lux, camera.clock())
 
 
 def _tone(camera: CameraServer, order: dict[str, Any]) -> None:
@@ -120,6 +130,7 @@ ORDERS: dict[str, Order] = {
     "/event": _event,
     "/stir": _stir,
     "/board": _board,
+    "/light": _light,
     "/tone": _tone,
     "/clock": _clock,
     "/card": _card,

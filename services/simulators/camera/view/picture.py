@@ -1,4 +1,7 @@
-"""What the camera makes of the scene: exposure while turning, noise, colour, flips, digital zoom and JPEG."""
+"""What the camera makes of the scene: exposure while turning, noise, colour, flips, digital zoom and JPEG.
+
+How much light there is, and how noisy that makes the picture, is in `sensor`.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ from numpy.typing import NDArray
 from services.simulators.board import HeldBoard
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.motors import Pose, magnification
+from services.simulators.camera.view import sensor
 from services.simulators.camera.view.optics import Window, project, window
 from services.simulators.camera.view.prints import Image
 from services.simulators.camera.view.scene import Scene
@@ -25,7 +29,7 @@ from services.vision.frames import Array
 Stream = Literal["MainFormat", "ExtraFormat"]
 STREAMS: tuple[Stream, ...] = ("MainFormat", "ExtraFormat")
 EXPOSURE_S = 1 / 30  # indoors, by lamp light
-NOISE = 2.2  # grey levels, one sigma
+GRAIN = 24  # steps of the noise pattern's grain in one sigma
 NOISE_PLAY = 64  # pixels by which the noise pattern is shifted from frame to frame
 QUALITY = 88
 SETTLING_S, DARK = 1.5, 0.25  # a change of mode: how long, and how dark at first; inferred
@@ -62,12 +66,19 @@ class Pictures:
         self._goals: dict[Stream, Pose | None] = {}
         self._newest: dict[Stream, tuple[object, bytes]] = {}
         self._rng = np.random.default_rng(seed)
+        self.lux = scene.world.light
         self._tallies: dict[Stream, Tally] = {stream: Tally() for stream in STREAMS}
 
     @cached_property
     def _noise(self) -> NDArray[np.int8]:
         size = (self._camera.lens.height + NOISE_PLAY, self._camera.lens.width + NOISE_PLAY, 3)
-        return (self._rng.standard_normal(size, dtype=np.float32) * NOISE).round().astype(np.int8)
+        return (self._rng.standard_normal(size, dtype=np.float32) * sensor.NOISE).round().astype(np.int8)
+
+    @cached_property
+    def _grain(self) -> NDArray[np.int8]:
+        """Fine enough to be amplified; from dice of its own, so that pictures in good light do not depend on it."""
+        pattern = self._rng.spawn(1)[0].standard_normal(self._noise.shape, dtype=np.float32)
+        return np.clip((pattern * GRAIN).round(), -127, 127).astype(np.int8)
 
     def fps(self, stream: Stream) -> int:
         """Frames per second of a stream."""
@@ -108,9 +119,10 @@ class Pictures:
         with self._lock:
             pose, rates = self._motors(now)
             moved = self._scene.changes
-            key = (pose, self._tables.changes, self.light(now), int(now * self.fps(stream)), moved)
+            exposure = self.light(now)
+            key = (pose, self._tables.changes, self.lux, exposure, int(now * self.fps(stream)), moved)
             if stream not in self._newest or self._newest[stream][0] != key:
-                self._newest[stream] = key, _encoded(self._developed(stream, pose, rates, key[2]))
+                self._newest[stream] = key, _encoded(self._developed(stream, pose, rates, exposure))
             return self._newest[stream][1]
 
     def hold(self, name: str, board: HeldBoard | None) -> None:
@@ -118,10 +130,17 @@ class Pictures:
         with self._lock:
             self._scene.hold(name, board)
 
+    def shine(self, lux: float, now: float) -> None:
+        """Somebody switches lamps on or off: there is so much light from now on."""
+        with self._lock:
+            self.lux = lux
+            self._tables.expose(now)
+
     def light(self, now: float) -> float:
-        """How much light it has found: a change of mode starts in the dark, and settles in SETTLING_S."""
-        since = now - self._tables.exposed_at
-        return 1.0 if not 0.0 <= since < SETTLING_S else DARK + (1.0 - DARK) * since / SETTLING_S
+        """How bright the picture is, of 1: a change of mode or light starts dark, and settles in SETTLING_S as bright
+        as the sensor can make it."""
+        since, share = now - self._tables.exposed_at, sensor.light(self.lux, self._tables).share
+        return share if not 0.0 <= since < SETTLING_S else share * (DARK + (1.0 - DARK) * since / SETTLING_S)
 
     def _developed(self, stream: Stream, pose: Pose, rates: Pose, exposure: float) -> Image:
         self._tallies[stream].note()
@@ -134,8 +153,9 @@ class Pictures:
         image = blurred(still.image, sweep * still.window.scale / view.scale)
         image = _resized(image, (view.width, view.height))
         image = image if exposure == 1.0 else np.asarray(cv2.convertScaleAbs(image, alpha=exposure), np.uint8)
-        image = _resized(self._noisy(image), size)
-        return upright(self._toned(image), self._camera, self._tables)
+        light = sensor.light(self.lux, self._tables)
+        image = _resized(self._noisy(image, light.gain), size)
+        return upright(self._toned(image, grey=light.grey), self._camera, self._tables)
 
     def _window(self, pose: Pose, size: tuple[int, int]) -> Window:
         """What the picture shows, never finer than the sensor."""
@@ -169,19 +189,23 @@ class Pictures:
         )
         return np.asarray(comes - was)
 
-    def _noisy(self, image: Image) -> Image:
+    def _noisy(self, image: Image, gain: float) -> Image:
         height, width = image.shape[:2]
         y, x = (int(i) for i in self._rng.integers(NOISE_PLAY, size=2))
-        patch = self._noise[y : y + height, x : x + width]
+        spot = slice(y, y + height), slice(x, x + width)
+        if gain == 1.0:
+            return np.asarray(cv2.add(image, self._noise[spot], dtype=cv2.CV_8U), np.uint8)
+        sigma = cv2.LUT(image, sensor.noise(gain))
+        patch = cv2.multiply(sigma, self._grain[spot], scale=1 / GRAIN, dtype=cv2.CV_32F)
         return np.asarray(cv2.add(image, patch, dtype=cv2.CV_8U), np.uint8)
 
-    def _toned(self, image: Image) -> Image:
+    def _toned(self, image: Image, *, grey: bool) -> Image:
         """Black and white, saturation, contrast and brightness as the tables say."""
         settings = {k: self._tables.number(f"VideoColor[0][0].{k}") for k in ("Brightness", "Contrast", "Saturation")}
-        saturation = 0 if self._tables.colour == "bw" else settings["Saturation"]
+        saturation = 0 if grey else settings["Saturation"]
         if saturation != 50:
-            grey = cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
-            image = np.asarray(cv2.addWeighted(image, saturation / 50, grey, 1 - saturation / 50, 0), np.uint8)
+            plain = cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+            image = np.asarray(cv2.addWeighted(image, saturation / 50, plain, 1 - saturation / 50, 0), np.uint8)
         if settings["Contrast"] == settings["Brightness"] == 50:
             return image
         gain, shift = 2 ** ((settings["Contrast"] - 50) / 50), (settings["Brightness"] - 50) * 1.2
