@@ -62,7 +62,7 @@ from tests.camera.recorded import Recorded
 LATENCY_S = 0.03
 AT_ONCE = 4
 UNSEEN = {  # switches that cannot be seen from outside, or only by doing harm
-    "boot_s", "drowsy_s", "event_listeners", "latency_tail",
+    "boot_s", "drowsy_s", "event_listeners", "event_writes", "heartbeat_least_s", "latency_tail",
     "lockout_failures", "lockout_of", "lockout_s",
     "max_connections", "over_limit", "pan_acceleration", "snapshot_drop", "spurious_401",
     "stream_slowdown_s", "tilt_acceleration", "zoom_acceleration", "zoom_speed",

@@ -37,7 +37,7 @@ WORDS: dict[str, tuple[str, dict[object, str]]] = {  # switch -> what it is, and
                                     "newest": "newest: angles twice"}),
     "position_key": ("Position spelled", {}),
     "move_status": ("The word Moving", {"honest": "is honest", "always-idle": "never comes: it says Idle",
-                                        "stuck": "stays for ever"}),
+                                        "stuck": "stays for ever", "unknown": "never comes: it says Unknown"}),
     "status_dither": ("At rest the reading", {True: "trembles by a tenth", False: "stands"}),
     "mirror_inverts_motors": ("Mirrored picture", {True: "turns the motors round", False: "leaves the motors"}),
     "position_abs": ("PositionABS", {"full": "goes there", "pan-only": "pan only", "bad-request": "is refused"}),

@@ -62,6 +62,9 @@ def read_events(body: bytes) -> dict[str, Any]:
     if length:
         form["event_length_space"] = bool(length[1])
         parts = body[length.end() :]  # a second header block ends in an empty line too
+        if text := re.match(rb"\r\n\r\n(\r\n)?(.*?)\r\n\r\n", parts, re.DOTALL):
+            form["event_line_before"] = bool(text[1])
+            form["event_length_off"] = int(length[2]) - len(text[2])
         between = re.search(rb"(?:[^\r\n]\n?)\r\n\r\n((?:\r\n)*)--\w", parts)
         if between:
             form["event_blank_lines"] = len(between[1]) // 2

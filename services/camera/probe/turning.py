@@ -136,7 +136,8 @@ def _honesty(turner: Turner) -> None:
     elif not turning:
         turner.found.unknown["move_status"] = "too slow to be seen on the way"
     else:
-        turner.found.switches["move_status"] = "honest" if "Moving" in turning else "always-idle"
+        told = "unknown" if turning == {"Unknown"} else "always-idle"
+        turner.found.switches["move_status"] = "honest" if "Moving" in turning else told
 
 
 def _absolute(turner: Turner) -> None:

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 Endless = Callable[["CameraServer", Request], Generator[bytes]]
 FULL = b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
-HEARTBEATS_S = (1.0, 60.0)
+HEARTBEAT_MOST_S = 60
+GATHERED_S = 0.2  # so long some firmware waits for more to write at once
+PIECE, BETWEEN_S = 48, 0.02  # other firmware's pieces: bytes, and the pause that keeps the network from joining them
 
 
 def video(camera: CameraServer, request: Request) -> Generator[bytes]:
@@ -32,10 +34,8 @@ def video(camera: CameraServer, request: Request) -> Generator[bytes]:
 
 def attach(camera: CameraServer, request: Request) -> Generator[bytes]:
     """Events as they happen, and heartbeats between them."""
-    least, most = HEARTBEATS_S
-    beat = request.text("heartbeat")
-    every = min(max(float(beat), least), most) if beat.isdigit() else most
-    profile = camera.device.profile
+    profile, beat = camera.device.profile, request.text("heartbeat")
+    every = min(max(int(beat), profile.heartbeat_least_s), HEARTBEAT_MOST_S) if beat.isdigit() else HEARTBEAT_MOST_S
     subscription = camera.device.events.subscribe(events.wanted(request.text("codes")))
     if subscription is None:
         yield FULL
@@ -48,9 +48,24 @@ def attach(camera: CameraServer, request: Request) -> Generator[bytes]:
             if text == "":
                 return
             if (text or (beat and profile.heartbeat)) and not camera.faults.silent_events:
-                yield events.part(profile, text or "Heartbeat")
+                yield from _written(camera, subscription, events.part(profile, text or "Heartbeat"))
     finally:
         camera.device.events.leave(subscription)
+
+
+def _written(camera: CameraServer, subscription: events.Subscription, data: bytes) -> Generator[bytes]:
+    """A part as it goes out: whole, in pieces, or together with what follows soon."""
+    profile = camera.device.profile
+    if profile.event_writes == "gathered":
+        while text := subscription.next(GATHERED_S):
+            data += events.part(profile, text)
+        if text == "":
+            subscription.wake()
+    size = PIECE if profile.event_writes == "pieces" else len(data)
+    for start in range(0, len(data), size):
+        yield data[start : start + size]
+        if size < len(data):
+            camera.closing.wait(BETWEEN_S)
 
 
 ENDLESS: dict[tuple[str, str], Endless] = {("mjpg/video", ""): video, ("eventManager", "attach"): attach}

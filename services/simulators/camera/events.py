@@ -30,8 +30,9 @@ def head(profile: Profile) -> bytes:
 def part(profile: Profile, text: str) -> bytes:
     """One part of the endless answer."""
     space, blank = " " * profile.event_length_space, "\r\n" * profile.event_blank_lines
-    top = f"--{BOUNDARY}\r\nContent-Type: text/plain\r\nContent-Length:{space}{len(text.encode())}\r\n\r\n"
-    return f"{top}{text}\r\n\r\n{blank}".encode()
+    length, before = len(text.encode()) + profile.event_length_off, "\r\n" * profile.event_line_before
+    top = f"--{BOUNDARY}\r\nContent-Type: text/plain\r\nContent-Length:{space}{length}\r\n\r\n"
+    return f"{top}{before}{text}\r\n\r\n{blank}".encode()
 
 
 def written(profile: Profile, code: str, action: str, index: int, data: Data | None = None) -> str:

@@ -19,6 +19,7 @@ PROFILES: dict[str, Profile] = {
         status_form="c",
         mirror_inverts_motors=False,
         heartbeat=False,
+        event_length_off=2,
         preset_max=8,
         lens_mask=False,
     ),
@@ -63,6 +64,8 @@ PROFILES: dict[str, Profile] = {
         unset_preset="ok",
         move_status="stuck",
         tours=True,
+        event_line_before=True,
+        event_writes="pieces",
         snapshot_drop=0.05,
     ),
     "ip3m-943b": Profile(
@@ -109,6 +112,7 @@ PROFILES: dict[str, Profile] = {
         event_form="A",
         lens_mask=False,
         event_blank_lines=2,
+        event_writes="gathered",
     ),
     # Turns by shares of half a turn from where it is, and to no position.
     "sd1a-2019": Profile(
@@ -125,7 +129,7 @@ PROFILES: dict[str, Profile] = {
         presets_form="long",
         preset_max=300,
         status_form="b",
-        move_status="always-idle",
+        move_status="unknown",
         event_form="A",
     ),
     # The newest: SHA-256, timed moves, positions in shares of the travel.

@@ -54,7 +54,7 @@ class Profile:
     auto_scan: bool = False
     status_form: Literal["a", "b", "c", "newest"] = "a"
     position_key: Literal["Postion", "Position"] = "Postion"
-    move_status: Literal["honest", "always-idle", "stuck"] = "honest"
+    move_status: Literal["honest", "always-idle", "stuck", "unknown"] = "honest"
     status_dither: bool = False  # a reading at rest is 0.1 more or less at times
 
     daynight: Literal["VideoInOptions", "VideoInDayNight"] = "VideoInOptions"
@@ -62,10 +62,14 @@ class Profile:
     lens_mask: bool = True  # it can turn the lens away (LeLensMask)
     config_narrowing: bool = True  # a narrowed table name works; otherwise it gives an empty answer
     heartbeat: bool = True
+    heartbeat_least_s: int = 1  # asked for more often, it beats so often
     event_form: Literal["A", "B"] = "B"  # A has data
     event_header_twice: bool = False  # a second header block before the first part
     event_length_space: bool = False  # after `Content-Length:`
+    event_length_off: int = 0  # what it counts too many (negative: too few); 2 where it counts the line's end
+    event_line_before: bool = False  # an empty line stands before the text
     event_blank_lines: int = 0  # more than needed between two parts
+    event_writes: Literal["parts", "pieces", "gathered"] = "parts"  # what goes out at once
     event_listeners: int = 25
     onvif: bool = True  # it has the ONVIF services too
 

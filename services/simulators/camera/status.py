@@ -22,6 +22,8 @@ def status(profile: Profile, at: Pose, moves: tuple[bool, bool], preset: int) ->
         yield from (f"status.Zoom={at.zoom:.0f}", f"status.ZoomValue={at.zoom:.0f}")
         return
     turns, zooms = "Moving" if moves[0] else "Idle", "Zooming" if moves[1] else "Idle"
+    if profile.move_status == "unknown":
+        turns = zooms = "Unknown"
     place = [f"{key}[{axis}]={value:.6f}" for axis, value in enumerate(at)]
     lines = [f"MoveStatus={turns}", "PTS=0", *place, f"PresetID={preset}", "Sequence=0", "UTC=0", f"ZoomStatus={zooms}"]
     lines = [*LENS, *lines, "ZoomValue=170"] if form == "b" else ["Action=Preset", *lines]

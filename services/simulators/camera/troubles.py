@@ -10,6 +10,7 @@ corrupt_jpeg   pictures lose their second half
 nonce          a `share` (0.3) of the good logins is refused, with a new nonce
 password       the account has another `password` ("changed")
 locked         the account is locked, right passwords too
+lost_stop      the next `n` (1) stops of what turns are answered well, and stop nothing
 rights         the account may look but neither turn the camera nor write settings
 cut            the network is gone: nothing arrives and nothing gets out; with `refuses`, connecting is refused at once
 reboot         the camera restarts, once
@@ -63,6 +64,10 @@ def _locked(camera: CameraServer, on: bool, settings: Settings) -> None:
     camera.door.unlock()
 
 
+def _lost_stop(camera: CameraServer, on: bool, settings: Settings) -> None:
+    camera.device.ptz.loses_stops = int(settings.get("n", 1)) if on else 0
+
+
 def _rights(camera: CameraServer, on: bool, settings: Settings) -> None:
     camera.device.rights = not on
 
@@ -92,6 +97,7 @@ TROUBLES: dict[str, Switch] = {
     "nonce": _nonce,
     "password": _password,
     "locked": _locked,
+    "lost_stop": _lost_stop,
     "rights": _rights,
     "cut": _cut,
     "reboot": _reboot,

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 import httpx
 import pytest
 
-from services.simulators.camera import events
+from services.simulators.camera import Config, events, start
 from services.simulators.camera.device import Device
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.messages import read
@@ -73,6 +76,56 @@ def test_firmware_has_its_quirks() -> None:
     part = events.part(odd, "Heartbeat")
     assert part == b"--myboundary\r\nContent-Type: text/plain\r\nContent-Length: 9\r\n\r\nHeartbeat\r\n\r\n\r\n\r\n"
     assert PROFILES["2020s-dahua"].event_header_twice
+
+
+@pytest.mark.parametrize("form", [FORM_A, Profile()], ids=["A", "B"])
+@pytest.mark.parametrize(("off", "before"), [(2, False), (-12, False), (0, True), (2, True)])
+def test_firmware_counts_wrongly_and_begins_with_an_empty_line(form: Profile, off: int, before: bool) -> None:
+    text = events.written(form, "VideoMotion", "Start", 0)
+    part = events.part(replace(form, event_length_off=off, event_line_before=before), text).decode()
+    top, _, body = part.partition("\r\n\r\n")
+    assert top.endswith(f"Content-Length:{len(text) + off}")
+    assert body == "\r\n" * before + text + "\r\n\r\n"
+
+
+@contextmanager
+def _attached(config: Config, **switches: Any) -> Iterator[tuple[Simulated, Iterator[bytes]]]:
+    """A camera with such firmware, and the chunks that the network gives of its events."""
+    with start(config.model_copy(update={"switches": replace(Profile(), **switches)})) as camera:
+        auth = httpx.DigestAuth("ros", "secret123")
+        with httpx.Client(base_url=camera.url, auth=auth, timeout=10) as client, client.stream("GET", ATTACH) as stream:
+            chunks = stream.iter_raw()
+            assert b"HTTP" not in next(chunks)  # the first heartbeat: whoever sees it is attached
+            yield camera, chunks
+
+
+def test_a_chunk_holds_less_than_a_part_where_it_is_written_in_pieces(config: Config) -> None:
+    with _attached(config, event_writes="pieces", event_form="A") as (camera, chunks):
+        camera.server.device.events.tell("VideoMotion", "Start", data=REGION)
+        told, whole = b"", b'   "SmartMotionEnable" : true\n}\n\r\n\r\n'
+        sizes = []
+        while not told.endswith(whole):
+            sizes.append(len(chunk := next(chunks)))
+            told += chunk
+    assert b'   "RegionName" : [ "Region1" ],\n' in told
+    assert max(sizes) < 100
+    assert len(sizes) >= 4
+
+
+def test_a_chunk_holds_several_parts_where_they_are_gathered(config: Config) -> None:
+    with _attached(config, event_writes="gathered") as (camera, chunks):
+        for action in ("Start", "Stop", "Start"):
+            camera.server.device.events.tell("VideoMotion", action)
+        chunk = next(one for one in chunks if b"VideoMotion" in one)
+    assert chunk.count(b"--myboundary") >= 3
+    assert chunk.count(b"action=Start") == 2
+
+
+def test_a_slow_heart_beats_no_faster_than_it_can(config: Config) -> None:
+    with _attached(config, heartbeat_least_s=2) as (_, chunks):
+        began = time.monotonic()
+        assert b"Heartbeat" in next(chunks)
+        assert time.monotonic() - began > 1.5
 
 
 def test_turning_is_taken_for_motion_until_it_has_been_quiet_for_long_enough(device: Device) -> None:

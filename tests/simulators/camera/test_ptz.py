@@ -296,6 +296,7 @@ def test_the_newest_status_has_every_field(world: World) -> None:
         ("honest", "Idle", "Moving", "Idle"),
         ("always-idle", "Idle", "Idle", "Idle"),
         ("stuck", "Idle", "Moving", "Moving"),
+        ("unknown", "Unknown", "Unknown", "Unknown"),
     ],
 )
 def test_what_a_status_says_of_motion_cannot_be_relied_on(

@@ -117,6 +117,19 @@ def test_an_account_without_rights_looks_but_does_not_turn(client: httpx.Client,
     assert client.get(RIGHT).text == "OK\r\n"
 
 
+def test_stops_that_are_lost_are_answered_well_and_stop_nothing(client: httpx.Client, door: httpx.Client) -> None:
+    stop = RIGHT.replace("action=start", "action=stop")
+    door.post("/fault", json={"name": "lost_stop", "n": 2}).raise_for_status()
+    assert client.get(stop).text == "OK\r\n", "nothing turns: none to be lost"
+    assert client.get(RIGHT).text == "OK\r\n"
+    for _ in range(2):
+        assert client.get(stop).text == "OK\r\n"
+        here = _pan(door)
+        wait_until(lambda here=here: _pan(door) > here + 2.0, "the camera to turn on", 5)  # type: ignore[misc]
+    assert client.get(stop).text == "OK\r\n"
+    wait_until(lambda: not door.get("/state").json()["moving"], "rest", 5)
+
+
 def test_a_camera_that_a_router_says_is_not_there_resets_connections(client: httpx.Client, door: httpx.Client) -> None:
     with _fault(door, "cut", refuses=True), pytest.raises(httpx.TransportError):
         client.get(STATUS)
