@@ -37,6 +37,7 @@ from services.errors import DeviceError
 from services.runner import Post
 
 REPLY = "/camera/reply"
+GAP_S = 0.45  # between two readings that are compared: the slowest speed shows in that time
 STILL_DEG = 0.25  # two readings nearer than this are the same: the resolution is 0.1 degree, and some dither by that
 STOP_ALONE_S = 1.0  # longer than the pause between two tries of a stop
 END_S = 3.5  # the end of the service waits so long for a camera to stand still; then its watchdog goes on
@@ -234,12 +235,14 @@ def stand_still(
             if drives:
                 camera.send(Start(Direction.LEFT))
             camera.send(Stop(every=every, direction=direction))
-            readings = [camera.send(Status()) for _ in range(3)]  # the first may lag behind the motor
+            camera.send(Status())  # it may lag behind the motor
+            asked, before = clock(), camera.send(Status())
+            time.sleep(min(GAP_S, max(0.0, asked + GAP_S - clock())))
+            after = camera.send(Status())
         except DeviceError as error:
             log.warning("the stop at the end is not confirmed yet: %s", error)
             time.sleep(0.2)
             continue
-        before, after = readings[1:]
         if isinstance(before, Reading) and isinstance(after, Reading) and same(before, after):
             return True
         every = True

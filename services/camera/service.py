@@ -201,7 +201,9 @@ class CameraService:
                 continue
             if now < self.health.look_at(self.bulletin.still_for(now)):
                 continue  # it was read meanwhile, by a move that is over
-            now = (yield from attempt(Status())).received
+            reply = yield from attempt(Status())
+            now = reply.received
+            self.motors.see(reply, turning=self.bulletin.turning)
             if self.health.online and not met:
                 self.early.waits = True
                 yield from attempt(Identify())

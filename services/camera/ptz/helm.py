@@ -12,6 +12,7 @@ from services.camera.ptz.course import FOREVER, PAN, TILT, ZOOM, Course
 from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
 from services.camera.ptz.pace import ACT_PART, HALF_CHANGE, READ_LATE, READ_PART, STOP_LATE
 from services.camera.ptz.skill import LATE_PART, Skill
+from services.camera.ptz.stand import LOST
 from services.camera.ptz.stand import stop as until_confirmed
 from services.camera.requests import Direction, Reading, Reply, Request, Start, Status
 
@@ -109,14 +110,17 @@ class Helm:
         now = yield from wait(max(now, self.settled()))
         self.rests = self.course.rests_at()
         reply, seen, reading = yield from self._look()
-        since = reply.sent
+        since, unlike = reply.sent, 0
         while reading is None or (
             self.zoom_ends is None and (pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading))
         ):
             yield from wait(reply.sent + PAIR_S)
             before = seen
             reply, seen, reading = yield from self._look()
-            since = since if same(before, seen) else reply.sent
+            if not same(before, seen):
+                since, unlike = reply.sent, unlike + 1
+                if unlike % LOST == 0:  # the stop had no effect
+                    yield from until_confirmed(reply.received, every=unlike > LOST)
             if reply.sent >= since + PAIR_S and self.zoom_ends is None:
                 self.skill.always_moving = seen.moving is True
                 reading = seen

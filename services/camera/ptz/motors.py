@@ -1,11 +1,13 @@
 """Who has the motors: one order at a time, and a stop between two of them.
 
 A human's newest order wins, then a mission's, then a scan's; the loser ends `cancelled`. An order that fails or is
-cancelled is followed by a stop that is sent until it is confirmed; nothing else moves the camera before that.
+cancelled is followed by a stop that is sent until it is confirmed; nothing else moves the camera before that. A stop
+that was confirmed and had no effect shows in the readings that follow.
 """
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -16,12 +18,15 @@ from services.camera.plan import Plan, Run, Stage
 from services.camera.ptz.move import Arrival
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import Hold, halt, stop
-from services.camera.requests import Reading, Refused
+from services.camera.requests import Reading, Refused, Reply
 from services.camera.scan.wish import ScanFor
 from services.payloads import OrderState
 from services.topic import lateness
 
 STOP_LIMIT_S = 10.0  # a Stop order that is not confirmed by then has failed; the stopping goes on
+TURNS_ON = 2  # readings in a row, after the end of an order, that are unlike the one before: its stop had no effect
+
+log = logging.getLogger(__name__)
 
 MakePlan = Callable[[Command, float], Plan[Any]]
 Ended = Callable[[Job, OrderState, str | None, Reading | None, float], None]
@@ -42,6 +47,7 @@ class Motors:
         self._halting: Run | None = None
         self._next: Job | None = None
         self._stops: list[tuple[Job, float]] = []
+        self._turns: int | None = None  # such readings since the last order; None: it was seen at rest since then
 
     @property
     def busy(self) -> bool:
@@ -83,6 +89,16 @@ class Motors:
         """Ends whatever runs or waits, with a stop, although nobody ordered it."""
         self._cancel(why, now)
 
+    def see(self, reply: Reply, *, turning: bool) -> None:
+        """An answer to a look while nobody has the motors: what turns on after an order is stopped again."""
+        if self.busy or self._turns is None or reply.error is not None:
+            return
+        self._turns = self._turns + 1 if turning else None
+        if self._turns == TURNS_ON:
+            log.warning("the camera turns on after its stop, which is sent again")
+            self._turns = 0
+            self._halt(halt(reply.received), reply.received)
+
     def make_sure(self, now: float) -> None:
         """Stops what somebody else may have started."""
         if not self.busy:
@@ -121,6 +137,7 @@ class Motors:
             self._end("refused", str(error), now)
             return
         self.answers.tell(job, "running")
+        self._turns = 0
         run = self.stage.begin(plan, now, self._plan_ended)
         self._run = None if run.done else run
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from typing import cast
 
-from services.camera.device import same
+from services.camera.device import GAP_S, same
 from services.camera.plan import Plan, ask, attempt, wait
 from services.camera.ptz.skill import Skill
 from services.camera.requests import BadLogin, Direction, Locked, Reading, Refused, Reply, Start, Status, Stop, TurnFor
 from services.errors import DeviceError
 
-GAP_S = 0.45  # between two readings that are compared: the slowest speed shows in that time
+LOST = 4  # readings after a stop that are unlike the one before: it is not slowing down, the stop had no effect
 OVERRULES = 4  # readings in a row that are as the one before, whatever the camera says of its motion
 REFUSALS = 3
 GRACE_S = 1.0  # a timed move ends so much later than our stop, which is to end it
@@ -26,15 +26,19 @@ LOCKED_PAUSE_S = 60.0  # a camera that takes no login takes no stop either, and 
 def settle(near: Reading | None = None) -> Plan[tuple[Reading, float]]:
     """Reads until two successive readings are equal and the camera does not say that it moves; the reading, the time.
 
-    Firmware exists that never leaves `Moving`: some equal readings overrule it.
+    Firmware exists that never leaves `Moving`: some equal readings overrule it. A motion that goes on is ended again.
     """
-    last, equal = near, 0
+    last, equal, unlike = near, 0, 0
     for _ in range(60):
         reply = yield from ask(Status())
         reading = cast(Reading, reply.result)
         equal = equal + 1 if last is not None and same(last, reading) else 0
         if equal >= OVERRULES or (equal >= 1 and reading.moving is not True):
             return reading, reply.received
+        if last is not None and not equal:
+            unlike += 1
+            if unlike % LOST == 0:
+                yield from stop(reply.received, every=unlike > LOST)
         last = reading
         if reply.received - reply.sent < GAP_S:
             yield from wait(reply.sent + GAP_S)
