@@ -51,7 +51,7 @@ class MotionSettings(Section):
 
     codes: tuple[str, ...] = ("VideoMotion",)  # the camera's words; SmartMotionHuman and others where it has them
     hold_s: float = Field(default=15.0, gt=0, le=600)
-    heartbeat_s: int = Field(default=3, ge=1, le=60)  # three missed ones are noticed in 10 s: time enough to tell it
+    heartbeat_s: Literal[1, 2, 3, 4] = 3  # silence of 3.25 of them has to be noticed within 15 s
 
 
 class ClockSettings(Section):

@@ -122,6 +122,24 @@ def test_a_heartbeat_that_came_late_is_relied_on_like_any(tmp_path: Path, camera
         here.until(lambda: motion(here) == -1, NOTICED_S)
 
 
+def test_a_camera_that_beats_more_slowly_than_asked_is_well_and_asked_whether_it_still_is(tmp_path: Path) -> None:
+    with (
+        simulator(latency_s=0.02, switches={"heartbeat_least_s": 4}) as camera,
+        bench(tmp_path, camera, **QUICK) as here,
+    ):
+        here.until(lambda: "slow one" in here.service.motion.fact, NOTICED_S)
+        for_a_while(here, NOTICED_S)
+        assert {one["value"] for one in here.payloads("motion")} == {0}
+        assert sum("attach" in entry["target"] and entry["status"] == 200 for entry in log(here)) == 2
+        here.tell("event", code="VideoMotion", action="Start")
+        here.until(lambda: motion(here) == 1, 2)
+        here.tell("event", code="VideoMotion", action="Stop")
+        here.tell("fault", name="hang")
+        here.until(lambda: motion(here) == -1, NOTICED_S)
+        here.tell("well")
+        here.until(lambda: motion(here) == 0, WELL_S)
+
+
 def test_a_slow_camera_stays_usable_and_its_latency_is_told(here: Bench) -> None:
     here.tell("fault", name="slow", seconds=1.0)
     for_a_while(here, 6.0)

@@ -9,6 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from services.camera.settings import Config
+from services.camera.web.dahua import BEATS
 from services.errors import ConfigError
 from tests.camera.flat import Flat
 
@@ -29,6 +30,13 @@ def test_what_is_given_wins_over_the_profile() -> None:
         "alarm": True,
         "diagnostics": False,
     }
+
+
+@pytest.mark.parametrize("heartbeat_s", [0, 5, 60, -3, 2.5])
+def test_a_heartbeat_with_which_silence_is_noticed_too_late_is_refused(heartbeat_s: float) -> None:
+    with pytest.raises(ValidationError, match=r"heartbeat_s\n +Input should be 1, 2, 3 or 4"):
+        settings(motion={"heartbeat_s": heartbeat_s})
+    assert BEATS * settings(motion={"heartbeat_s": 4}).motion.heartbeat_s < 15.0
 
 
 @pytest.mark.parametrize("profile", ["lower", ["low"], 1, None])

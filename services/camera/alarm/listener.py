@@ -17,6 +17,7 @@ from services.runner import Post
 
 HEARD = "/camera/alarm"
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0  # between two attempts to attach
+TIMELY = 2.0  # heartbeats: one that comes later after the last proves nothing, and silence then proves nothing either
 WELL_S = 10.0  # a stream that lasted so long was a good one: the next attempt is made soon
 END_S = 2.0
 
@@ -24,7 +25,9 @@ log = logging.getLogger(__name__)
 
 
 class Ear(Protocol):
-    """What a brand offers: the camera's events."""
+    """What a brand offers: the camera's events. `heartbeat_s`: how often a sign of life was asked for."""
+
+    heartbeat_s: float
 
     def listen(self, *, patient: bool) -> Iterator[list[Event]]:
         """Attaches, yields an empty list then, and what comes; DeviceError when that ends or is not to be had.
@@ -57,7 +60,7 @@ class Listener:
 
     def __init__(self, name: str, ear: Ear, post: Post, clock: Callable[[], float] = time.time) -> None:
         self._ear, self._post, self._clock = ear, post, clock
-        self._beats = self._mute = False  # a heartbeat came; none did, and nothing else, for as long as some would have
+        self._beats = self._mute = False  # a heartbeat came in time; nothing did, for as long as some would have
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"{name} events", daemon=True)
         self._thread.start()
@@ -89,14 +92,17 @@ class Listener:
             self._closing.wait(max(pause, least))
 
     def _listen(self) -> None:
-        attached, patient = False, self._mute and not self._beats
-        for events in self._ear.listen(patient=patient):
+        attached, patient, beat_at = False, self._mute and not self._beats, 0.0
+        for came in self._ear.listen(patient=patient):
             if self._closing.is_set():
                 return
-            self._beats |= any(not event.code for event in events)
+            now, beat = self._clock(), any(not event.code for event in came)
+            timely = beat and now - beat_at <= TIMELY * self._ear.heartbeat_s
+            self._beats |= timely
+            events = tuple(event for event in came if event.code or timely)
             if events or not attached:
-                self._tell(Heard(self._clock(), tuple(events), attached=not attached))
-            attached = True
+                self._tell(Heard(now, events, attached=not attached))
+            attached, beat_at = True, now if beat or not attached else beat_at
             if patient and self._beats:
                 raise Away("it has a heartbeat after all, and is watched by that from now on")
 

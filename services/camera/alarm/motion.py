@@ -5,7 +5,7 @@
     Stop     ──> still 1 for `hold_s`, then 0
     no Stop within `hold_s` ──> the camera is asked: it may have been lost, or somebody is still there
     lost     ──> -1 after `GRACE_S`; at once when it had fallen silent, and then until there is a sign of life
-    mute (firmware without heartbeat: silence proves nothing) ──> the camera is asked every `MUTE_ASK_S`, too
+    mute (firmware without heartbeat, or a slow one: silence proves nothing) ──> asked every `MUTE_ASK_S`, too
 
 Not here: the connection (`listener.py`).
 """
@@ -60,7 +60,7 @@ class MotionWatch:
         if not self.on:
             return "off"
         if self._mute and self._trouble_at is None:
-            return "asked every few seconds: this firmware has no heartbeat"
+            return "asked every few seconds: this firmware has no heartbeat, or a slow one"
         if self._mute or not self._attached:
             return f"lost: {self._why}"
         return "attached" if self._beats else "attached, no heartbeat yet"

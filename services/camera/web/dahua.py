@@ -33,6 +33,7 @@ class DahuaEar:
     """An Ear (`alarm/listener.py`)."""
 
     def __init__(self, address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> None:
+        self.heartbeat_s = float(heartbeat_s)
         self._endless = Endless(address, gate, BEATS * heartbeat_s)
         self._target = events.attach(codes, heartbeat_s)
 
