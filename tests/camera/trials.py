@@ -218,6 +218,7 @@ class Fault:
     asked: str = ""  # on this topic of the camera, at the same time: nothing shows it before
     meanwhile: Callable[[Client], None] = lambda bus: None  # what has to hold while it lasts
     shows: Callable[[Client], bool] = lambda bus: True  # besides the status; it is asked until it holds
+    logged: Callable[[list[dict[str, Any]]], bool] = lambda log: True  # and in the requests that the camera met since
     back_s: float = 20.0  # after its end: everything is well again
 
     def __str__(self) -> str:
@@ -268,12 +269,29 @@ def stays_usable(bus: Client) -> None:
     assert not [payload for payload in said if b"bad_login" in payload or b"locked" in payload]
 
 
-def is_told_why(bus: Client) -> None:
-    """An order that the account has no right to give is answered so; the camera stays online, the password is right."""
-    result = bus.order("ip1", "Goto", "Kitchen")
-    assert result.state in ("refused", "failed"), result
-    assert "right" in (result.error or ""), result
-    assert state_of(bus, "ip1") == "online"
+def ordered(bus: Client) -> bool:
+    """Something of it is on its way."""
+    return bus.order("ip1", "Flip", "True").final
+
+
+def repeated(log: list[dict[str, Any]]) -> bool:
+    """Whether a good login was refused, and the same request was answered when it came again."""
+    refused = [at for at, one in enumerate(log) if one["authorized"] and one["status"] == 401]
+    again = [[(one["target"], one["status"]) for one in log[at + 1 :]] for at in refused]
+    return any((log[at]["target"], 200) in later for at, later in zip(refused, again, strict=True))
+
+
+def is_told_why(bus: Client) -> bool:
+    """Whether an order that the account has no right to give is answered so, while the camera stays online."""
+    result = bus.order("ip1", "Move", "Left 1 0.2")
+    told = result.state in ("refused", "failed") and "right" in (result.error or "")
+    return told and state_of(bus, "ip1") == "online"
+
+
+def refused_motion(log: list[dict[str, Any]]) -> bool:
+    """Whether the camera has refused to turn for want of rights, and has turned for nobody."""
+    starts = [one["status"] for one in log if "ptz.cgi?action=start" in one["target"]]
+    return 401 in starts and 200 not in starts
 
 
 def shows_no_half_picture(bus: Client) -> None:
@@ -292,12 +310,12 @@ FAULTS = (
     Fault("silent_events", ("online",), shows=alarm_in_trouble),
     Fault("frozen_stream", ("degraded",)),
     Fault("corrupt_jpeg", ("online",), asked="snapshot/get", meanwhile=shows_no_half_picture, shows=bad_snapshots),
-    Fault("nonce", ("online",), meanwhile=stays_usable),
+    Fault("nonce", ("online",), meanwhile=stays_usable, shows=ordered, logged=repeated),
     Fault("cut", ("offline",), shows=alarm_in_trouble),
     Fault("cut", ("offline",), {"refuses": True}, shows=alarm_in_trouble),
     Fault("reboot", ("offline", "rebooting")),
     Fault("locked", ("locked",), back_s=40.0),
-    Fault("rights", ("online",), meanwhile=is_told_why),
+    Fault("rights", ("online",), shows=is_told_why, logged=refused_motion),
 )
 
 
@@ -310,14 +328,19 @@ def fault(flat: SmallFlat, which: Fault, *, camera: str = "ip1") -> float:
     with flat.client(f"camera/{camera}/#", f"diagnostics/camera/{camera}") as bus:
         bus.payload(f"camera/{camera}/motion", lambda motion: motion.value != -1, 20.0)
         wait(bus, lambda: met(bus), 20.0, "the camera to have said who it is, and its alarm that it lives")
-        began = time.monotonic()
+        began, since = time.monotonic(), time.time()
         door.tell("fault", name=which.name, **which.settings)
         if which.also:
             door.tell(which.also)
         if which.asked:
             bus.say(f"camera/{camera}/{which.asked}", "now")
+
+        def shown() -> bool:
+            seen = state_of(bus, camera) in which.states and which.shows(bus)
+            return seen and which.logged([one for one in door.log() if one["time"] > since])
+
         try:
-            wait(bus, lambda: state_of(bus, camera) in which.states and which.shows(bus), NOTICED_S, str(which))
+            wait(bus, shown, NOTICED_S, str(which))
             seconds = time.monotonic() - began
             which.meanwhile(bus)
         finally:
