@@ -158,6 +158,39 @@ def test_a_clock_that_is_wrong_is_set(tmp_path: Path, camera: simulated.Simulate
         assert "%20" in written[0]
 
 
+def settings_of_the_clock(here: Bench) -> int:
+    return sum("setCurrentTime" in entry["target"] and entry["status"] == 200 for entry in log(here))
+
+
+@pytest.mark.parametrize("offset_s", [-500.0, 86400.0])
+def test_a_clock_that_is_moved_while_the_service_runs_is_set(
+    tmp_path: Path, camera: simulated.Simulated, offset_s: float
+) -> None:
+    with bench(tmp_path, camera, clock={"every_s": 2.0}) as here:
+        here.until(lambda: "time_drift_s" in here.service.bulletin.facts.values, 15)
+        assert settings_of_the_clock(here) == 0
+        here.tell("clock", offset_s=offset_s)
+        here.until(lambda: abs(camera.server.device.clock.offset(time.time())) < 1.5, 15)
+        assert settings_of_the_clock(here) == 1
+
+
+def test_a_clock_that_runs_too_fast_is_set_again_and_again(tmp_path: Path, camera: simulated.Simulated) -> None:
+    off = [0.0]
+    with bench(tmp_path, camera, clock={"every_s": 1.0, "drift_s": 2.0}) as here:
+        here.until(lambda: "time_drift_s" in here.service.bulletin.facts.values, 15)
+        here.tell("clock", drift_ppm=500_000.0)  # half a second each second
+        began = time.monotonic()
+
+        def set_often() -> bool:
+            off.append(abs(camera.server.device.clock.offset(time.time())))
+            return settings_of_the_clock(here) >= 3
+
+        here.until(set_often, 60)
+        drifted = 0.5 * (time.monotonic() - began)
+        assert 2.0 < max(off) < 6.0
+        assert drifted > 1.2 * max(off), "so far it would have gone"
+
+
 def test_an_idle_camera_that_wants_two_requests_for_each_is_asked_at_most_twice_a_second(tmp_path: Path) -> None:
     with simulator(profile="2020s-dahua", latency_s=0.02) as camera, bench(tmp_path, camera) as here:
         for_a_while(here, 5.0)

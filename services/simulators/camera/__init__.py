@@ -2,7 +2,8 @@
 
 Built from the facts about the API and from `world.yaml` alone: it must not import the camera service, which would
 then be tested against its own opinions. From outside in: `program` -> `http` (wire) -> `digest`, `device` -> `ptz`,
-`config_tables`, `events` -> `motors`; `picture` -> `scene` -> `prints`, `order`, `solids`, `textures`, `optics`.
+`config_tables`, `events` -> `motors`; `picture` -> `sensor`, `scene`;
+`scene` -> `prints`, `order`, `solids`, `textures`, `optics`.
 """
 
 from __future__ import annotations
