@@ -79,9 +79,10 @@ class Watch:
         """The database is there."""
         self._away_since = None
 
-    def diagnostic(self, now: float) -> Diagnostic:
-        """How the broker's queue is."""
+    def diagnostic(self, now: float, mark: str | None = None) -> Diagnostic:
+        """How the broker's queue is; with a mark that is known when it comes back."""
         values = {"held": str(self._held), "limit": str(self._limit), "dropped": str(self.dropped or 0)}
+        values.update({"mark": mark} if mark else {})
         level, text = 0, "no message is missing"
         if now < self._loss_until:
             level, text = 2, self._loss

@@ -12,12 +12,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from uuid import uuid4
 
 from pydantic import Field
 
 from services import topics
 from services.apartment.home import Home
-from services.bus import SESSION_TOPIC, Message
+from services.bus import SESSION_TOPIC, Message, topic_matches
 from services.errors import BadMessage, ConfigError, Unavailable
 from services.persistence import broker, rows, rulebook, strategies
 from services.persistence.connection import Connection
@@ -41,7 +42,7 @@ COUNTERS = ("rows", "batches", "refused", "unit_mismatch", "clock_steps", "resto
 class Config(DatabaseSection):
     """The section `persistence`."""
 
-    restore_after_s: float = Field(default=2.0, ge=0)  # how long the broker may take for its retained states
+    restore_after_s: float = Field(default=2.0, ge=0)  # how long retained states may come after all that waited
     broker_queue: int = Field(default=1_000_000, ge=1)  # the broker's max_queued_messages, as in mosquitto.conf
     name: str = "persistence"
     strategies: Path | None = None  # persistence.yaml; without it `persist` of each item in home.yaml says when
@@ -79,8 +80,11 @@ class Persistence:
     """The service; see `services.runner.Service`."""
 
     def __init__(self, config: Config, opener: Callable[[], Storage]) -> None:
-        own_status = topics.SERVICE_STATUS.filter_for(service=config.name)  # its echo shows that there is a broker
-        self.subscribes = (*config.writers.filters(config.home), own_status, *broker.FILTERS, SESSION_TOPIC)
+        self._name = config.writers.name(config.name)
+        self._health = topics.DIAGNOSTICS.name(component=f"{self._name}/broker")  # it carries the mark of `Restore`
+        filters = config.writers.filters(config.home)
+        heard = any(topic_matches(one, self._health) for one in filters)
+        self.subscribes = (*filters, *(() if heard else (self._health,)), *broker.FILTERS, SESSION_TOPIC)
         self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self.connection = Connection(opener, self.counters)
         self._home = config.home
@@ -89,9 +93,9 @@ class Persistence:
         self._timetable = Timetable(rules)
         self._decisions = Decisions(config.home, rules, self.counters, config.writers.unknown)
         self._restore = Restore(self._decisions.restored, config.restore_after_s)
+        self._restore.begin(uuid4().hex)
         self._gathered: list[tuple[rows.State | Row, Message]] = []
         self._fresh: list[rows.State | Row] = []  # of it what is not there already
-        self._name = config.writers.name(config.name)
         self._seen = Seen(self._name)
         self._broker = broker.Watch(config.broker_queue, self.counters)
         self._noted: int | None = None  # of the broker's count of dropped messages, in the database
@@ -124,7 +128,8 @@ class Persistence:
             return ()
         self._broker.came(now)
         known = topics.read(message, now)
-        self._restore.begin(now)
+        if message.topic == self._health:
+            self._restore.heard(known.payload.values.get("mark"), now)
         row = rows.read(known, self._next_time(message.received or now), self._home) if known.topic.stored else None
         if row is None or not self._writers.takes(row):
             return ()
@@ -159,6 +164,8 @@ class Persistence:
             known_before = self._connected or self._seen.any
             told = self._broker.session(present=message.value is True, known_before=known_before, now=now)
             self._connected = True
+            self._restore.begin(uuid4().hex)
+            self._next_diagnostic = now  # it is said at once
         else:
             told = self._broker.heard(message.topic, message.payload, now)
         if told:
@@ -174,7 +181,8 @@ class Persistence:
         if now < self._next_diagnostic:
             return []
         self._next_diagnostic = now + DIAGNOSTIC_EVERY_S
-        return [topics.DIAGNOSTICS.message(self._broker.diagnostic(now), component=f"{self._name}/broker")]
+        told = self._broker.diagnostic(now, self._restore.mark)
+        return [topics.DIAGNOSTICS.message(told, component=f"{self._name}/broker")]
 
     def _next_time(self, at: float) -> int:
         """Microseconds, never the same twice and never back: a clock that steps back must not reorder rows."""

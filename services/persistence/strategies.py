@@ -91,20 +91,32 @@ class Timetable:
 
 
 class Restore:
-    """Which items get their last state back: those that the broker told nothing about for a while after the start.
+    """Which items get their last state back: those that the broker told nothing about after the start.
 
-    `due` is when to look; it is set by the first message, which shows that there is a broker.
+    It may have hours of messages for us, and its retained states come behind them. So a mark is said at each
+    connection, after it was asked for them: all that it had is here when the mark is heard again. `due` is when to
+    look, a while after that: a broker may hand out retained states beside its queue.
     """
 
     def __init__(self, items: Iterable[str], patience_s: float) -> None:
         self._waiting = set(items)
         self._patience_s = patience_s
         self._own: dict[str, str] = {}
+        self._mark = ""
         self.due: float | None = None
 
-    def begin(self, now: float) -> None:
-        """A message came."""
-        if self.due is None and self._waiting:
+    @property
+    def mark(self) -> str | None:
+        """What is to be said, again and again, until it is heard; None when nothing is waited for."""
+        return self._mark if self._waiting and self.due is None else None
+
+    def begin(self, mark: str) -> None:
+        """A connection was made; no other one ever had this mark."""
+        self._mark, self.due = mark, None
+
+    def heard(self, mark: str | None, now: float) -> None:
+        """A mark came: of this connection, or of an older one."""
+        if mark and mark == self.mark:
             self.due = now + self._patience_s
 
     def saw(self, item: str, text: str) -> bool:

@@ -12,14 +12,14 @@ import pytest
 from pydantic import SecretStr, ValidationError
 
 from services.apartment.home import Home, Item
-from services.bus import Message, topic_matches
+from services.bus import SESSION_TOPIC, Message, topic_matches
 from services.errors import BadMessage, ConfigError, Unavailable
 from services.payloads import Diagnostic, OrderResult
 from services.peers import free_port
 from services.persistence import Config, start
 from services.persistence.service import Persistence
 from services.storage import Address, Batch, Sample, Storage, open_storage
-from services.topics import CAMERA_ORDER_RESULT, DIAGNOSTICS, HOME_STATE, SERVICE_STATUS
+from services.topics import CAMERA_ORDER_RESULT, DIAGNOSTICS, HOME_STATE
 from tests.databases import Database
 
 T = 1_769_839_200.0  # 2026-01-31 06:00 UTC
@@ -31,7 +31,6 @@ HOME = Home(
         "Secret": Item(type="String", label="Secret", persist=()),
     }
 )
-ONLINE = SERVICE_STATUS.message("online", service="persistence")._replace(received=T + 10)
 
 
 def state(item: str, text: str, at: float = 0.0, *, retained: bool = False) -> Message:
@@ -66,6 +65,13 @@ def turn(service: Persistence, *messages: Message, now: float | None = None) -> 
     return [one for one in said if not one.topic.startswith("diagnostics/")]
 
 
+def connected(service: Persistence, at: float, *came: Message) -> list[Message]:
+    """The turns in which the broker hands out what it has, and the last of it, our own health; what was published."""
+    service.handle(Message(SESSION_TOPIC, value=True), T + at)
+    health = [one for one in service.tick(T + at) if one.topic == "diagnostics/persistence/broker"]
+    return turn(service, *came, *(one._replace(retain=False, received=T + at) for one in health))
+
+
 def stored(database: Database, item: str) -> list[tuple[float, float | None, str | None]]:
     """Time after T in seconds, number and text of an item's rows."""
     storage = open_storage(database.address)
@@ -76,7 +82,7 @@ def stored(database: Database, item: str) -> list[tuple[float, float | None, str
 
 def test_it_listens_to_everything_that_is_stored() -> None:
     service = Persistence(Config(url="sqlite:///unused", home=HOME), lambda: pytest.fail("not yet"))
-    for topic in ("home/Light/state", "camera/ip1/scan/result", "diagnostics/camera/ip1", "service/persistence/status"):
+    for topic in ("home/Light/state", "camera/ip1/scan/result", "diagnostics/camera/ip1"):
         assert any(topic_matches(wanted, topic) for wanted in service.subscribes)
     assert not any(topic_matches(wanted, "camera/ip1/snapshot") for wanted in service.subscribes)
 
@@ -192,8 +198,8 @@ class TestRestoring:
         with running(database) as service:
             turn(service, state("Light", "ON", 1), state("Temp", "21 °C", 1), state("Power", "5 W", 1))
         with running(database) as service:
-            assert turn(service, ONLINE) == []
-            assert turn(service, state("Light", "OFF", 10.5)) == []
+            assert turn(service, state("Light", "ON", 9)) == []
+            assert connected(service, 10, state("Light", "OFF", 9.5)) == []
             assert service.due == T + 12
             said = turn(service, now=T + 12)
             assert [(one.topic, one.payload.decode(), one.retain, one.once) for one in said] == [
@@ -217,11 +223,23 @@ class TestRestoring:
             assert service.due is None
             assert turn(service, now=T + 1000) == []
 
+    def test_what_an_older_connection_left_behind_shows_nothing(self, database: Database) -> None:
+        with running(database) as service:
+            turn(service, state("Light", "ON", 1))
+        with running(database) as service:
+            (older,) = service.tick(T + 5)
+        with running(database) as service:
+            turn(service, older._replace(retain=False, received=T + 9))
+            turn(service, state("Power", "5 W", 9))
+            assert turn(service, now=T + 1000) == []
+            assert connected(service, 1000) == []
+            assert [one.topic for one in turn(service, now=T + 1002)] == ["home/Light/state"]
+
     def test_an_update_after_its_restoring_is_stored(self, database: Database) -> None:
         with running(database) as service:
             turn(service, state("Power", "5 W", 1))
         with running(database) as service:
-            turn(service, ONLINE)
+            assert connected(service, 10) == []
             (restored,) = turn(service, now=T + 12)
             turn(service, restored._replace(retain=False, received=T + 12))
             turn(service, state("Power", "5 W", 13))

@@ -52,29 +52,54 @@ def test_strategies_that_nobody_knows_are_told() -> None:
     ]
 
 
+def waiting(*items: str) -> Restore:
+    """On its second connection."""
+    restore = Restore(items, 2.0)
+    restore.begin("m1")
+    restore.begin("m2")
+    return restore
+
+
 class TestRestore:
-    def test_it_waits_for_the_first_message_and_then_a_while(self) -> None:
-        restore = Restore(["Light"], 2.0)
+    def test_it_waits_for_its_mark_and_then_a_while(self) -> None:
+        restore = waiting("Light")
         assert restore.due is None
         assert restore.missing(1e9) == []
-        restore.begin(100.0)
-        restore.begin(101.0)
+        assert restore.mark == "m2"
+        for older in ("m1", "", None):
+            restore.heard(older, 50.0)
+        assert restore.due is None
+        restore.heard("m2", 100.0)
+        restore.heard("m2", 101.0)
+        assert restore.mark is None
         assert restore.due == 102.0
         assert restore.missing(101.9) == []
         assert restore.missing(102.0) == ["Light"]
 
+    def test_a_connection_that_broke_meanwhile_is_waited_for_anew(self) -> None:
+        restore = waiting("Light")
+        restore.heard("m2", 100.0)
+        restore.begin("m3")
+        assert restore.missing(1e9) == []
+        restore.heard("m2", 200.0)
+        assert restore.missing(1e9) == []
+        restore.heard("m3", 200.0)
+        assert restore.missing(202.0) == ["Light"]
+
     def test_it_happens_once(self) -> None:
-        restore = Restore(["Light"], 2.0)
-        restore.begin(0.0)
+        restore = waiting("Light")
+        restore.heard("m2", 0.0)
         assert restore.missing(2.0) == ["Light"]
-        restore.begin(3.0)
+        restore.begin("m3")
+        assert restore.mark is None
+        restore.heard("m3", 3.0)
         assert restore.due is None
         assert restore.missing(9.0) == []
 
     def test_items_that_the_broker_has_are_left_alone(self) -> None:
-        restore = Restore(["Light", "Door"], 2.0)
-        restore.begin(0.0)
+        restore = waiting("Light", "Door")
         assert not restore.saw("Light", "ON")
+        restore.heard("m2", 0.0)
         assert restore.missing(2.0) == ["Door"]
 
     def test_the_echo_of_a_restored_state_is_known_once(self) -> None:
