@@ -19,8 +19,8 @@ from pydantic import BaseModel, Field, SecretStr, ValidationError
 
 from services import document, secret_store
 from services.apartment.home import Home
-from services.document import Document, Path_
-from services.errors import ConfigError
+from services.document import Document, Fault, Path_
+from services.errors import ConfigError, SettingError
 from services.registry import REGISTRY, Row
 from services.section import Section
 from services.topic import LEVELS
@@ -57,14 +57,16 @@ class Instance:
     config: Section
 
 
-def check_files(instances: dict[str, Instance]) -> list[str]:
-    """The faults of the files that the services' own settings name (rules, places, the world)."""
+def check_files(instances: dict[str, Instance], source: Document) -> list[str]:
+    """The faults of the files that the services' own settings name; `source` gets those of settings themselves."""
     faults: list[str] = []
     for instance in instances.values():
         check = getattr(importlib.import_module(instance.row.module), "check", None)
         try:
             if check is not None:
                 check(instance.config)
+        except SettingError as error:
+            source.fault(error.path, error.text)
         except ConfigError as error:
             faults += error.faults
     return faults
@@ -118,15 +120,11 @@ def load(
     _unknown_sections(raw, source)
     _misnamed_cameras(raw, source)
     instances = {one.name: one for one in _instances(raw, source, cameras, given)}
-    faults = [*_wanted(source.faults, only), *home_faults, *(check_files(instances) if deep else [])]
+    others = check_files(instances, source) if deep else []
+    faults = [*_wanted(source.faults, only), *home_faults, *others]
     if faults or top is None or home is None:
-        raise ConfigError(sorted(dict.fromkeys(faults), key=_by_place))
+        raise ConfigError(sorted(dict.fromkeys(faults), key=document.by_place))
     return Apartment(file, top.bus, home, state, cameras, top.grouped, instances)
-
-
-def _by_place(fault: str) -> tuple[str, int]:
-    file, line, _ = fault.split(":", 2)
-    return file, int(line)
 
 
 def _wanted(faults: list[str], only: tuple[str, ...] | None) -> list[str]:
@@ -137,7 +135,7 @@ def _wanted(faults: list[str], only: tuple[str, ...] | None) -> list[str]:
     kept = [*(f"bus.accounts.{name}" for name in only), *(f"{section}." for name in only for section in _section(name))]
 
     def matters(fault: str) -> bool:
-        where = fault.split(": ", 2)[1]
+        where = fault.key if isinstance(fault, Fault) else ""
         foreign = where.startswith(mine) and not any(where.startswith(prefix) for prefix in kept)
         return not ("expected ${" in fault and foreign)
 

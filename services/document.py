@@ -44,6 +44,23 @@ class _Dumper(yaml.SafeDumper):
 _Dumper.add_representer(list, lambda dumper, value: dumper.represent_sequence("tag:yaml.org,2002:seq", value, True))
 
 
+class Fault(str):
+    """A fault in the form that people are shown. It keeps its parts, since any of them may hold a colon too."""
+
+    place: tuple[str, int]  # file and line
+    key: str
+
+    def __new__(cls, file: Path, line: int, key: str, text: str) -> Fault:
+        self = super().__new__(cls, f"{file}:{line}: {key}: {text}")
+        self.place, self.key = (str(file), line), key
+        return self
+
+
+def by_place(fault: str) -> tuple[str, int]:
+    """What faults are sorted by."""
+    return fault.place if isinstance(fault, Fault) else (fault, 0)
+
+
 @dataclass
 class Document:
     """`value` as plain Python values; `lines` maps a path of keys to its line; `faults` found while reading."""
@@ -51,17 +68,21 @@ class Document:
     file: Path
     value: Any = None
     lines: dict[Path_, int] = field(default_factory=dict)
-    faults: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)  # each is a Fault
 
-    def where(self, path: Path_) -> str:
-        """`file:line` of a path, or of the nearest thing around it that stands in the file."""
+    def line(self, path: Path_) -> int:
+        """The line of a path, or of the nearest thing around it that stands in the file."""
         while path and path not in self.lines:
             path = path[:-1]
-        return f"{self.file}:{self.lines.get(path, 1)}"
+        return self.lines.get(path, 1)
+
+    def where(self, path: Path_) -> str:
+        """`file:line` of a path."""
+        return f"{self.file}:{self.line(path)}"
 
     def fault(self, path: Path_, text: str) -> None:
-        """Notes a fault in the form that people are shown."""
-        self.faults.append(f"{self.where(path)}: {dotted(path) or 'file'}: {text}")
+        """Notes a fault."""
+        self.faults.append(Fault(self.file, self.line(path), dotted(path) or "file", text))
 
 
 def dotted(path: Path_) -> str:
@@ -131,7 +152,8 @@ class _Reader:
         self.count += 1
         if self.count > MOST or len(path) > DEEPEST:
             wanted = f"{MOST} values" if self.count > MOST else f"lists and mappings {DEEPEST} deep"
-            raise ConfigError([f"{self.document.file}:{node.start_mark.line + 1}: file: expected {wanted} at most"])
+            line = node.start_mark.line + 1
+            raise ConfigError([Fault(self.document.file, line, "file", f"expected {wanted} at most")])
         if isinstance(node, yaml.MappingNode):
             return self.mapping(node, path)
         if isinstance(node, yaml.SequenceNode):

@@ -36,3 +36,14 @@ class ConfigError(ApartmentError):
     def __init__(self, faults: Iterable[str]) -> None:
         self.faults: tuple[str, ...] = tuple(faults)
         super().__init__("\n".join(self.faults))
+
+
+class SettingError(ConfigError):
+    """Settings of a service that do not go together: `path` is the keys of one of them, from the file's top.
+
+    Where it stands is for who read the file (`config.py`).
+    """
+
+    def __init__(self, path: tuple[str, ...], text: str) -> None:
+        self.path, self.text = path, text
+        super().__init__([f"{'.'.join(path)}: {text}"])

@@ -121,6 +121,39 @@ def test_the_files_that_services_name_are_checked_too(folder: Path) -> None:
         assert any(fault.startswith(f"{spoilt}:") for fault in told), f"{spoilt}:{line} not in {told}"
 
 
+def test_a_strategy_that_nobody_knows_is_told_with_its_line(folder: Path) -> None:
+    home = folder / "home.yaml"
+    line = spoil(home, "persist: [restoreOnStartup]", "persist: [restorOnStartup]", first=True)
+    (told,) = faults(folder / "simulated.yaml")
+    assert told.startswith(f"{home}:{line}: items.Home_Location.persist[0]: expected 'everyChange', 'everyUpdate' or ")
+    assert told.endswith(", got 'restorOnStartup'")
+
+
+def test_what_cannot_be_dealt_out_to_writers_is_told_with_the_line_of_that_setting(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, "\npersistence:\n", "\npersistence:\n  writers:\n    count: 2\n    by: share\n") + 4
+    (told,) = faults(file)
+    assert told.startswith(
+        f"{file}:{line}: persistence.writers.by: expected item, or everyUpdate alone without a filter"
+    )
+    assert told.endswith(", got share")
+
+
+def test_a_colon_in_the_path_of_the_files_confuses_nothing(folder: Path) -> None:
+    folder = folder.rename(folder.with_name("at: 10:30"))
+    file = folder / "simulated.yaml"
+    lines = [
+        spoil(file, "  port: ${APARTMENT_BROKER_PORT:-1883}", "  port: many"),
+        spoil(file, "default_camera: ip1", "default_camera: ip7"),
+        spoil(file, "simulators:\n", "simulators:\n  cameras:\n    hall: {password: '${NOT_HERE}'}\n") + 2,
+    ]
+    told = faults(file)
+    assert [one.startswith(f"{file}:{line}: ") for one, line in zip(told, sorted(lines), strict=True)] == [True] * 3
+    with pytest.raises(ConfigError) as caught:
+        load(file, ("bridge",))
+    assert "NOT_HERE" not in str(caught.value)
+
+
 def test_check_lists_every_fault_and_ends_with_two(folder: Path) -> None:
     file = folder / "simulated.yaml"
     spoil(file, "  port: ${APARTMENT_BROKER_PORT:-1883}", "  port: 99999")

@@ -19,6 +19,7 @@ from services.states import ITEM_TYPES, base_type
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 NOT_A_NAME = "expected a name of letters, digits and _ that does not begin with a digit"
 GROUP_ROS = "ROS"  # the group whose members go to the robot, as in the report
+Strategy = Literal["everyChange", "everyUpdate", "restoreOnStartup"]  # when a state is stored, in OpenHAB's words
 Value = bool | int | float | str  # of a setting in OpenHAB's files
 
 
@@ -120,7 +121,7 @@ class Item(Section):
     read_only: bool = False
     autoupdate: bool = True  # OpenHAB takes a command for the new state at once; else only the device's report counts
     ros: bool = True  # member of group ROS: on the robot's topics
-    persist: tuple[str, ...] = ("everyChange", "restoreOnStartup")  # empty: never stored
+    persist: tuple[Strategy, ...] = ("everyChange", "restoreOnStartup")  # empty: never stored
     channels: dict[str, dict[str, Value]] = Field(default={})  # OpenHAB's channels, each with settings such as profile
     mqtt: MqttTopics | None = None
     alexa: Alexa | None = None  # None: not for Alexa

@@ -24,9 +24,8 @@ def text(site: Site) -> str:
 def _lines(site: Site) -> Iterator[str]:
     by_strategies: dict[tuple[str, ...], list[str]] = {}
     for item_name, item in site.home.items.items():
-        known = tuple(one for one in item.persist if one in BUILT_IN)
-        if known:
-            by_strategies.setdefault(known, []).append(name(item_name, PERSIST_WORDS))
+        if item.persist:
+            by_strategies.setdefault(item.persist, []).append(name(item_name, PERSIST_WORDS))
     for strategies, names in by_strategies.items():
         yield f"{_wrapped(names)} : strategy = {', '.join(strategies)}"
 

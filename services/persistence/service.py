@@ -19,8 +19,8 @@ from pydantic import Field
 from services import topics
 from services.apartment.home import Home
 from services.bus import SESSION_TOPIC, Message, topic_matches
-from services.errors import BadMessage, ConfigError, Unavailable
-from services.persistence import broker, rows, rulebook, strategies
+from services.errors import BadMessage, SettingError, Unavailable
+from services.persistence import broker, rows, rulebook
 from services.persistence.connection import Connection
 from services.persistence.decisions import Decisions
 from services.persistence.seen import Seen
@@ -57,9 +57,10 @@ class Config(DatabaseSection):
 
 
 def check(config: Config) -> None:
-    """ConfigError with every fault of the strategies."""
-    if faults := list(strategies.faults(config.home)) or list(config.writers.faults(config.rules)):
-        raise ConfigError(faults)
+    """ConfigError with every fault of the strategies, also of those that do not go with several writers."""
+    if unfit := config.writers.unfit(config.rules):
+        wanted = f"expected item, or everyUpdate alone without a filter for {', '.join(unfit)}"
+        raise SettingError(("persistence", "writers", "by"), f"{wanted}, got {config.writers.by}")
 
 
 @contextmanager

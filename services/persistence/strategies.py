@@ -6,14 +6,15 @@ An update that two strategies or two lines want makes one row.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import get_args
 
-from services.apartment.home import Home
+from services.apartment.home import Strategy
 from services.persistence.cron import Cron
 from services.persistence.filters import Filter, Kept
 
-BUILT_IN = ("everyChange", "everyUpdate", "restoreOnStartup")
+BUILT_IN: tuple[str, ...] = get_args(Strategy)
 Value = tuple[float | None, str | None]  # number and text of a sample; numbers compare, so 21.50 °C is 21.5 °C
 
 
@@ -58,14 +59,6 @@ def rule(names: Iterable[str]) -> Rule:
 
 
 UNKNOWN_ITEM = rule(["everyChange"])  # an item that the home's model does not have is kept, but never restored
-
-
-def faults(home: Home) -> Iterator[str]:
-    """The strategies of the home's items that nobody knows."""
-    for name, item in home.items.items():
-        for strategy in item.persist:
-            if strategy not in BUILT_IN:
-                yield f"items.{name}.persist: expected of {', '.join(BUILT_IN)}, got {strategy!r}"
 
 
 class Timetable:

@@ -7,7 +7,7 @@ different writers, so there is no order among them, and nothing may depend on an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Literal, Self
 from zlib import crc32
 
@@ -85,11 +85,10 @@ class Writers(Section):
         """The rule of an item that the home's model does not have."""
         return EVERY_UPDATE if self.shared else strategies.UNKNOWN_ITEM
 
-    def faults(self, rules: Mapping[str, Rule]) -> Iterator[str]:
+    def unfit(self, rules: Mapping[str, Rule]) -> list[str]:
         """The items whose rule needs their last value, where the broker deals the states out."""
-        for name, rule in rules.items() if self.shared else ():
-            if rule.restore or any(line != Line(update=True) for line in rule.lines):
-                yield f"persistence.writers.by: share: expected everyUpdate alone, without a filter, for {name}"
+        kept = [(name, one) for name, one in rules.items() if self.shared and (one.restore or one.stores)]
+        return [name for name, one in kept if one.restore or any(line != Line(update=True) for line in one.lines)]
 
     def next_time(self, at: int, last: int) -> int:
         """The first of this writer's microseconds from `at` on, and after `last`: no two writers have one in common."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from services.apartment.home import Home, Item
 from services.persistence import strategies
 from services.persistence.strategies import Restore, Value
 
@@ -43,13 +42,6 @@ def test_a_state_is_stored_as_its_strategies_say(
 ) -> None:
     (line,) = strategies.rule(names).lines
     assert line.wants(changed=value != last, retained=retained) is stored
-
-
-def test_strategies_that_nobody_knows_are_told() -> None:
-    home = Home(items={"Light": Item(type="Switch", label="Light", persist=("everyChange", "everyMoon"))})
-    assert list(strategies.faults(home)) == [
-        "items.Light.persist: expected of everyChange, everyUpdate, restoreOnStartup, got 'everyMoon'"
-    ]
 
 
 def waiting(*items: str) -> Restore:

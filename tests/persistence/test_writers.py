@@ -57,10 +57,8 @@ def test_no_two_writers_have_a_time_in_common() -> None:
 def test_what_needs_the_last_value_cannot_be_dealt_out() -> None:
     home = Home(items={"Light": Item(type="Switch", label="L"), "Fan": Item(type="Switch", label="F", persist=())})
     config = Config(url="sqlite:///unused", home=home, writers=Writers(count=2, by="share"))
-    with (
-        pytest.raises(ConfigError, match="expected everyUpdate alone, without a filter, for Light"),
-        start(config, lambda message: None),
-    ):
+    told = "by: expected item, or everyUpdate alone without a filter for Light, got share"
+    with pytest.raises(ConfigError, match=told), start(config, lambda message: None):
         pass
 
 
