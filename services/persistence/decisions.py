@@ -11,11 +11,12 @@ from collections.abc import Callable, Iterable, Mapping, Set
 
 from services.apartment.home import Home
 from services.persistence import rows, strategies
+from services.persistence.again import Again
 from services.persistence.filters import Kept
 from services.persistence.rows import State
 from services.persistence.strategies import Rule
 from services.states import SPECIAL
-from services.storage import Batch, Diagnostic, Item, Row, Sample
+from services.storage import Batch, CameraOrder, Diagnostic, Item, Mission, Row, Sample
 
 log = logging.getLogger(__name__)
 
@@ -33,6 +34,7 @@ class Decisions:
         self._heard: dict[str, State] = {}  # what a cron strategy stores
         self._passed: dict[tuple[str, int], Kept] = {}  # by item and line: what the filters compare with
         self._levels: dict[str, tuple[int, str]] = {}  # of components: level and message
+        self.again = Again()
         self._odd: set[str] = set()  # items of which a value in another unit was told
 
     @property
@@ -80,6 +82,10 @@ class Decisions:
         for one in gathered:
             if isinstance(one, State):
                 self._add_state(batch, one, items)
+            elif isinstance(one, CameraOrder):
+                batch.rows.append(self.again.order(one))
+            elif isinstance(one, Mission):
+                batch.rows.append(self.again.mission(one))
             elif not isinstance(one, Diagnostic) or self._is_transition(one):
                 batch.rows.append(one)
         return batch

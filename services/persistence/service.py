@@ -20,14 +20,14 @@ from services import topics
 from services.apartment.home import Home
 from services.bus import SESSION_TOPIC, Message, topic_matches
 from services.errors import BadMessage, SettingError, Unavailable
-from services.persistence import broker, rows, rulebook
+from services.persistence import again, broker, rows, rulebook
 from services.persistence.connection import Connection
 from services.persistence.decisions import Decisions
 from services.persistence.seen import Seen
 from services.persistence.strategies import Restore, Rule, Timetable
 from services.persistence.writers import Writers
 from services.runner import Post
-from services.storage import Batch, Row, Storage, open_storage
+from services.storage import Batch, Row, Storage, open_storage, reading
 from services.storage.settings import DatabaseSection
 
 log = logging.getLogger(__name__)
@@ -201,6 +201,7 @@ class Persistence:
             return
         last = storage.last_values()
         self._decisions.learn(last, storage.last_diagnostics())
+        self._decisions.again.learn(reading.open_orders(storage), reading.newest_missions(storage, again.MISSIONS))
         self._time = max([self._time, *(sample.time for sample in last.values())])
         self._seen.learn(storage.seen(self._name))
         self._noted = storage.noted(self._name, "dropped")

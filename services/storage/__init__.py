@@ -91,7 +91,7 @@ class Scan:
 
 @dataclass(frozen=True, slots=True)
 class CameraOrder:
-    """An order; written at each of its states, `at` is the time of the first. Fields are the columns."""
+    """An order; written at each of its states, `at` is the time of the first in all. Fields are the columns."""
 
     order_id: str
     camera: str
@@ -104,7 +104,7 @@ class CameraOrder:
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """A mission; written at each of its states, and left alone once it has ended. Fields are the columns.
+    """A mission; written at each of its states, and left alone once it has ended. `started` is the same in all.
 
     Position in the apartment, metres; `story` is JSON: [[seconds since it began, step, text], ...].
     """

@@ -50,10 +50,15 @@ TABLES = (
         "mission",
         ("mission", "robot", "marker", "state", "reason", "place", "x", "y", "z", "seen_by", "started", "ended",
          "story"),
-        ("mission",),
+        ("robot", "mission", "started"),
         ("started", "ended"),
     ),
-    Table("camera_order", ("order_id", "camera", "name", "value", "state", "error", "at"), ("order_id",), ("at",)),
+    Table(
+        "camera_order",
+        ("order_id", "camera", "name", "value", "state", "error", "at"),
+        ("camera", "order_id", "at"),
+        ("at",),
+    ),
     Table("diagnostic", ("component", "time", "level", "message", "details"), ("component", "time"), ("time",)),
 )  # fmt: skip
 BY_NAME = {table.name: table for table in TABLES}

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 
-from services.storage import TIMES, Item, Mission, Sample, Storage
+from services.storage import FINAL_STATES, TIMES, Item, Mission, Sample, Storage
 from services.storage.mysql_text import MICROSECONDS, moment
 
 SECOND = 1_000_000
+LAST = (2**31 - 1) * SECOND  # what MariaDB's TIMESTAMP holds
 YEAR_0_TO_1970_S = (
     62_167_219_200  # TO_SECONDS counts whole ones, in UTC as our sessions do; UNIX_TIMESTAMP slow decimals
 )
@@ -142,6 +143,22 @@ def durations(storage: Storage, item: Item, since: int, until: int) -> dict[str,
         f"AND s.time>={sql.at(start)} AND s.time<{sql.at(until)}) r) d GROUP BY v"
     )
     return {_plain(value): int(spent) for value, spent in rows}
+
+
+def open_orders(storage: Storage) -> list[tuple[str, str, int]]:
+    """Camera, id and first time of the orders that have not ended, oldest first."""
+    micro = DIALECTS[storage.dialect].micro.format("at")
+    return [
+        (str(camera), str(order), int(at))
+        for camera, order, at in storage.read(
+            f"SELECT camera, order_id, {micro} FROM camera_order WHERE state NOT IN {FINAL_STATES} ORDER BY at"
+        )
+    ]
+
+
+def newest_missions(storage: Storage, limit: int) -> list[Mission]:
+    """The missions that began last, oldest first."""
+    return missions(storage, SECOND, LAST, limit)
 
 
 def missions(storage: Storage, since: int, until: int, limit: int) -> list[Mission]:

@@ -14,12 +14,13 @@ from pydantic import SecretStr, ValidationError
 from services.apartment.home import Home, Item
 from services.bus import SESSION_TOPIC, Message, topic_matches
 from services.errors import BadMessage, Unavailable
-from services.payloads import Diagnostic, OrderResult
+from services.payloads import Diagnostic, OrderResult, stamp
+from services.payloads.robot import MissionResult, MissionState
 from services.peers import free_port
 from services.persistence import Config, start
 from services.persistence.service import Persistence
 from services.storage import Address, Batch, Sample, Storage, open_storage
-from services.topics import CAMERA_ORDER_RESULT, DIAGNOSTICS, HOME_STATE
+from services.topics import CAMERA_ORDER_RESULT, DIAGNOSTICS, HOME_STATE, MISSION_RESULT, MISSION_STATE
 from tests.databases import Database
 
 T = 1_769_839_200.0  # 2026-01-31 06:00 UTC
@@ -180,17 +181,51 @@ def test_diagnostics_are_stored_when_they_change(database: Database) -> None:
     assert rows == [(0, "fine"), (2, "no answer"), (0, "fine")]
 
 
-def test_an_order_is_one_row_that_ends_in_its_final_state(database: Database) -> None:
-    def told(outcome: str, at: float) -> Message:
-        result = OrderResult.model_validate({"id": "o1", "key": "Goto", "value": "Kitchen", "state": outcome})
-        return CAMERA_ORDER_RESULT.message(result, cam="ip1")._replace(received=T + at)
+def ordered(outcome: str, at: float, camera: str = "ip1", order: str = "o1") -> Message:
+    result = OrderResult.model_validate({"id": order, "key": "Goto", "value": "Kitchen", "state": outcome})
+    return CAMERA_ORDER_RESULT.message(result, cam=camera)._replace(received=T + at)
 
+
+def test_an_order_is_one_row_that_ends_in_its_final_state(database: Database) -> None:
     with running(database) as service:
-        turn(service, told("accepted", 1), told("running", 2))
-        turn(service, told("done", 3))
+        turn(service, ordered("accepted", 1), ordered("running", 2))
+    with running(database) as service:
+        turn(service, ordered("done", 3))
     assert database.rows("SELECT order_id, camera, name, value, state FROM camera_order") == [
         ("o1", "ip1", "Goto", "Kitchen", "done")
     ]
+
+
+def test_orders_with_an_id_that_was_used_before_are_rows_of_their_own(database: Database) -> None:
+    with running(database) as service:
+        turn(service, ordered("accepted", 1), ordered("accepted", 2, "ip2"), ordered("refused", 3, order="O1"))
+        turn(service, ordered("done", 4), ordered("failed", 5, "ip2"))
+        turn(service, ordered("accepted", 1001), ordered("cancelled", 1002), ordered("refused", 1003))
+    told = database.rows("SELECT camera, order_id, state FROM camera_order ORDER BY at")
+    assert told == [
+        ("ip1", "o1", "done"), ("ip2", "o1", "failed"), ("ip1", "O1", "refused"),
+        ("ip1", "o1", "cancelled"), ("ip1", "o1", "refused"),
+    ]  # fmt: skip
+
+
+def test_a_mission_is_one_row_and_another_with_its_id_a_second(database: Database) -> None:
+    def step(state: str, robot: str, at: float, after_s: float) -> Message:
+        told = MissionState(state=state, id="1", marker=582, since=stamp(T + at), elapsed_s=round(after_s, 1))
+        return MISSION_STATE.message(told, robot=robot)._replace(received=T + at, retain=False)
+
+    def end(state: str, robot: str, at: float, after_s: float) -> Message:
+        told = MissionResult(id="1", marker=582, state=state, elapsed_s=round(after_s, 1), stamp=stamp(T + at))
+        return MISSION_RESULT.message(told, robot=robot)._replace(received=T + at)
+
+    with running(database) as service:
+        turn(service, step("go", "tiago", 1, 0), step("go", "rosie", 1.04, 0))
+        turn(service, end("refused", "tiago", 5, 0))  # the same id again, while it drives
+    with running(database) as service:
+        turn(service, step("look", "tiago", 8.33, 7.33), end("found", "tiago", 20.26, 19.26))
+        turn(service, step("found", "tiago", 20.26, 19.26)._replace(retain=True), end("failed", "rosie", 21.04, 20))
+        turn(service, step("go", "tiago", 100, 0), end("not_found", "tiago", 130, 30))
+    told = database.rows("SELECT robot, state FROM mission ORDER BY started")
+    assert told == [("tiago", "found"), ("rosie", "failed"), ("tiago", "refused"), ("tiago", "not_found")]
 
 
 class TestRestoring:

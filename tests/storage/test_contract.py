@@ -149,7 +149,7 @@ def test_an_order_ends_in_the_states_in_which_it_ends_on_the_bus() -> None:
 def test_a_mission_follows_its_states_until_it_has_ended(storage: Storage) -> None:
     going = Mission("m1", "tiago", 582, "go", "to Sofa", "Sofa", None, None, None, None, T0, None, None)
     found = replace(going, state="found", reason="seen", x=1.5, y=2.0, z=0.5, seen_by="tiago", ended=T0 + MINUTE)
-    storage.write(Batch(rows=[replace(going, state="look", place=None), replace(going, started=T0 + 7)]))
+    storage.write(Batch(rows=[replace(going, state="look", place=None), going]))
     assert reading.missions(storage, 0, T0 + MINUTE, 9) == [going]
     storage.write(Batch(rows=[replace(going, state="scan", place=None)]))
     assert reading.missions(storage, 0, T0 + MINUTE, 9) == [replace(going, state="scan")]
@@ -167,11 +167,26 @@ def test_the_newest_missions_of_a_span_are_told_oldest_first(storage: Storage) -
 
 def test_an_order_keeps_its_first_time_and_its_final_state(storage: Storage, database: Database) -> None:
     order = CameraOrder("o1", "ip1", "Goto", "Kitchen", "accepted", None, T0)
-    failed = replace(order, state="failed", error="no such place", at=T0 + MINUTE)
-    storage.write(Batch(rows=[order, replace(order, state="running", at=T0 + 1)]))
+    failed = replace(order, state="failed", error="no such place")
+    storage.write(Batch(rows=[order, replace(order, state="running")]))
     assert database.rows("SELECT state, error FROM camera_order") == [("running", None)]
-    storage.write(Batch(rows=[failed, replace(order, at=T0 + 2 * MINUTE), replace(failed, state="done", error=None)]))
+    storage.write(Batch(rows=[failed, order, replace(failed, state="done", error=None)]))
     assert database.rows("SELECT state, error FROM camera_order") == [("failed", "no such place")]
+
+
+def test_an_id_may_be_used_again_by_another_and_on_another_day(storage: Storage, database: Database) -> None:
+    order = CameraOrder("a", "ip1", "Goto", "Kitchen", "done", None, T0)
+    others = [replace(order, camera="ip2"), replace(order, order_id="A"), replace(order, at=T0 + MINUTE)]
+    mission = Mission("a", "tiago", 1, "found", None, None, None, None, None, None, T0, T0, None)
+    more = [replace(mission, robot="rosie"), replace(mission, mission="A"), replace(mission, started=T0 + MINUTE)]
+    for _ in range(2):
+        storage.write(Batch(rows=[order, *others, mission, *more]))
+    assert database.rows("SELECT COUNT(*) FROM camera_order") == [(4,)]
+    assert database.rows("SELECT COUNT(*) FROM mission") == [(4,)]
+    running = replace(order, state="running", at=T0 + 9)
+    storage.write(Batch(rows=[running]))
+    assert reading.open_orders(storage) == [("ip1", "a", T0 + 9)]
+    assert reading.newest_missions(storage, 1) == [more[-1]]
 
 
 def test_items_are_made_once_and_keep_their_id_and_unit(storage: Storage, database: Database) -> None:
@@ -227,7 +242,7 @@ def test_what_was_written_is_there_for_the_next_who_opens(storage: Storage, data
     again = open_storage(database.address)
     assert again.last("Lab_Temp") == Sample("Lab_Temp", T0, 21.5, None)
     assert again.items["Lab_Temp"].unit == "°C"
-    assert database.rows("SELECT MAX(version) FROM schema_version") == [(3,)]
+    assert database.rows("SELECT MAX(version) FROM schema_version") == [(4,)]
     again.close()
 
 

@@ -6,6 +6,7 @@ import json
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,18 @@ from typer.testing import CliRunner
 from services.__main__ import app
 from services.errors import ConfigError
 from services.peers import mariadb
-from services.storage import Batch, Item, Sample, open_plain, open_storage, read_address, upkeep
+from services.storage import (
+    Batch,
+    CameraOrder,
+    Item,
+    Mission,
+    Sample,
+    open_plain,
+    open_storage,
+    read_address,
+    reading,
+    upkeep,
+)
 from services.storage.migrate import versions
 from tests.databases import Database, MariaDb, connected, fresh_mariadb
 from tests.persistence.test_service import url
@@ -233,6 +245,20 @@ def test_the_schema_goes_back_and_forth_and_keeps_the_rows(database: Database, s
     storage = open_storage(database.address)
     storage.add_items([Item("Note", "String")])
     storage.write(Batch([Sample("Note", us("2026-01-31 07:00:00"), None, "kept")]))
+    orders = [
+        CameraOrder(which, "ip1", "Goto", "Sofa", "done", None, us(at))
+        for which, at in [("a", "2026-01-31 07:00:00"), ("a", "2026-01-31 08:00:00"), ("b", "2026-01-31 07:00:00")]
+    ]
+    mission = Mission("a", "tiago", 1, "found", "", None, 1.0, None, None, None, us("2026-01-31 07:00:00"), None, "[]")
+    missions = [mission, replace(mission, started=us("2026-01-31 09:00:00"))]
+    storage.write(Batch(rows=[*orders, *missions]))
+    storage.close()
+    assert "from schema version 4 to 3" in run(site, "upgrade", "--to", "3")
+    assert database.rows("SELECT COUNT(*) FROM camera_order") == [(2,)]  # that program knows an id once
+    assert "schema version 4" in run(site, "upgrade")
+    storage = open_storage(database.address)
+    assert reading.newest_missions(storage, 9) == missions[1:]
+    assert database.rows("SELECT order_id FROM camera_order ORDER BY at") == [("b",), ("a",)]
     storage.close()
     newest = max(versions(database.address.dialect))
     assert f"from schema version {newest} to 1" in run(site, "upgrade", "--to", "1")

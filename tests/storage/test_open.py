@@ -71,7 +71,7 @@ def test_a_newer_schema_is_refused(database: Database) -> None:
     storage = open_storage(database.address)
     storage.close()
     newer(database)
-    with pytest.raises(ConfigError, match="schema version 99, this program knows 3"):
+    with pytest.raises(ConfigError, match="schema version 99, this program knows 4"):
         open_storage(database.address)
 
 
