@@ -7,18 +7,20 @@ keeping house has a connection of its own, under another account (`keeper`). Not
 from __future__ import annotations
 
 import logging
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Self
+from typing import Any, Self
 
 from pydantic import SecretStr, model_validator
+from pydantic_core import from_json
 
 from services import topics
 from services.apartment.home import Home
 from services.bus import Message
-from services.errors import ConfigError, Unavailable
+from services.errors import BadMessage, ConfigError, Unavailable
 from services.history import answers, keeping
 from services.history.keeping import Keep
 from services.payloads.history import HistoryGet, HistoryReply
@@ -27,6 +29,7 @@ from services.section import Section
 from services.storage import Storage, open_ready
 from services.storage.address import Address
 from services.storage.settings import DatabaseSection
+from services.topic import LEVELS
 
 log = logging.getLogger(__name__)
 
@@ -34,6 +37,7 @@ AGAIN_S = 1.0  # between attempts to open the database
 COUNTERS = ("questions", "unanswered", "pieces")
 ROUND_EVERY_S = 600.0  # of keeping house
 PAUSE_S = 0.02  # between its pieces: the writer and questions come first
+LONGEST_ITEM = 200  # characters of what is no item's name, in an answer
 SETTLE_S = 60.0  # after the database was opened
 
 
@@ -111,6 +115,15 @@ class Opened:
         self._storage = self.since = None
 
 
+def _object(payload: bytes) -> dict[str, Any]:
+    """What can be read of a message that makes no sense."""
+    try:
+        told = from_json(payload)
+    except ValueError:
+        return {}
+    return told if isinstance(told, dict) else {}
+
+
 class History:
     """The service; see `services.runner.Service`. `keeper` opens the database for keeping house, else `opener`."""
 
@@ -128,13 +141,33 @@ class History:
         self._asked, self._house = Opened(opener), Opened(keeper or opener)
 
     def handle(self, message: Message, now: float) -> Iterator[Message]:
-        """Answers a question, in every case."""
-        asked: HistoryGet = topics.read(message, now).payload
+        """Answers a question, in every case; one that makes no sense or comes late as far as its id can be read."""
         self.counters["questions"] += 1
+        try:
+            asked: HistoryGet = topics.read(message, now).payload
+        except BadMessage as error:
+            yield from self._refused(message, str(error))
+            raise
         reply = topics.HISTORY_REPLY.message(self._reply(asked, now), id=asked.id)
         if len(reply.payload) > topics.TEXT_LIMIT:
             reply = topics.HISTORY_REPLY.message(self._told(asked, "too long an answer: ask for less"), id=asked.id)
         yield reply
+        if (also := topics.reply(reply, message)) is not None:
+            yield also
+
+    def _refused(self, message: Message, error: str) -> Iterator[Message]:
+        """The answers to what is no question; without an id on the MQTT 5 response topic alone."""
+        self.counters["unanswered"] += 1
+        asked = _object(message.payload)
+        name, item = asked.get("id"), asked.get("item")
+        known = isinstance(name, str) and re.fullmatch(LEVELS["id"], name) is not None
+        told = HistoryReply(
+            id=str(name) if known else "", item=item[:LONGEST_ITEM] if isinstance(item, str) else None, samples=[],
+            error=error,
+        )  # fmt: skip
+        reply = topics.HISTORY_REPLY.message(told, id=name if known else "-")
+        if known:
+            yield reply
         if (also := topics.reply(reply, message)) is not None:
             yield also
 

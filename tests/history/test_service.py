@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -10,13 +12,13 @@ import pytest
 from services import topics
 from services.apartment.home import Home
 from services.bus import Message
-from services.errors import Unavailable
+from services.errors import BadMessage, Unavailable
 from services.history import Config, start
 from services.history.service import History
 from services.payloads import Point
 from services.payloads.robot import MissionEvent, MissionResult
 from services.storage import Batch, Item, Mission, Sample, open_storage
-from services.topics import HISTORY_GET, LateCommand
+from services.topics import HISTORY_GET
 from tests.storage.day import at
 
 NOW = at("10:00")
@@ -79,9 +81,38 @@ def test_an_answer_that_fits_into_no_message_is_told(tmp_path: Path) -> None:
         assert json.loads(told.payload)["error"] == "too long an answer: ask for less"
 
 
-def test_a_question_of_yesterday_is_refused(tmp_path: Path) -> None:
-    with start(filled(tmp_path), lambda message: None) as service, pytest.raises(LateCommand):
-        list(service.handle(asked(item="Note"), NOW + 60))
+WRONG = {
+    "no limit": (
+        asked(item="Note", limit=0),
+        "limit: Input should be greater than or equal to 1",
+        "q1",
+        "Note",
+    ),
+    "an unknown key": (asked(item="Note", many=1), "many: Extra inputs are not permitted, got '1'", "q1", "Note"),
+    "retained": (asked(item="Note")._replace(retain=True), "refused, a retained command", "q1", "Note"),
+    "of yesterday": (asked(item="Note")._replace(received=NOW - 60), "refused, 60.0 s old", "q1", "Note"),
+    "of no item": (asked(item=["Note"]), "item: Input should be a valid string", "q1", None),
+    "an id that is no level": (asked(id="a/+"), "id: String should match pattern", "", None),
+    "no JSON": (Message("history/get", b"Note", received=NOW), "payload: Invalid JSON", "", None),
+    "no object": (Message("history/get", b"[1]", received=NOW), "payload: Input should be an object", "", None),
+    "no UTF-8": (Message("history/get", b'{"id": "q1\xff"}', received=NOW), "expected UTF-8", "", None),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_is_no_question_is_dropped_and_answered_where_that_is_possible(tmp_path: Path, what: str) -> None:
+    question, error, name, item = WRONG[what]
+    on = ([f"history/reply/{name}"] if name else []) + ["reply/me"]
+    with start(filled(tmp_path), lambda message: None) as service:
+        answers = service.handle(question._replace(reply_to="reply/me", correlation=b"7"), NOW)
+        told = list(islice(answers, len(on)))
+        with pytest.raises(BadMessage, match=re.escape(error)):
+            next(answers)
+    assert [one.topic for one in told] == on
+    for one in told:
+        answer = json.loads(one.payload)
+        assert error in answer.pop("error")
+        assert (answer["id"], answer["item"], answer["samples"]) == (name, item, [])
 
 
 def test_a_database_that_is_away_is_told_and_tried_again_later(tmp_path: Path) -> None:
