@@ -37,7 +37,7 @@ from services.command_line import (
     stored,
     watch,
 )
-from services.command_line.options import CONFIG, SERVICES, Config, Json, out
+from services.command_line.options import CONFIG, SERVICES, Config, Json, Unread, out
 from services.config import Apartment, load
 from services.errors import ApartmentError, ConfigError
 from services.supervisor import Supervisor, commands, processes, simulated
@@ -82,6 +82,7 @@ def simulate(
 @app.command(epilog="Example: apartment demo --once")
 def demo(
     once: Annotated[bool, typer.Option("--once", help="End by itself once the marker was found.")] = False,
+    _config: Unread = CONFIG,
 ) -> None:
     """Run the whole apartment, simulated, and tell its story."""
     from services import demo as story  # it brings every service's libraries

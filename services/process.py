@@ -29,6 +29,7 @@ from services.bus import WAKE_TOPIC, Message
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.config import Apartment, BusSettings, Instance, Tls
+from services.errors import ConfigError
 from services.memory import few_arenas
 from services.runner import Runner
 from services.steering import Steered
@@ -118,10 +119,22 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
 
 
 def _one(apartment: Apartment, instance: Instance, stopping: threading.Event, ready: OneReady) -> None:
-    if instance.row.on_bus:
-        _on_bus(apartment, instance, stopping, ready)
-    else:
-        _off_bus(instance, stopping, ready)
+    try:
+        if instance.row.on_bus:
+            _on_bus(apartment, instance, stopping, ready)
+        else:
+            _off_bus(instance, stopping, ready)
+    except OSError as error:
+        if not isinstance(error.filename, str) or not _belongs(Path(error.filename), apartment.state):
+            raise
+        why = f"{error.filename}: {error.strerror}"
+        raise ConfigError([f"{apartment.file}:1: state: expected a folder that can be written, got {why}"]) from error
+
+
+def _belongs(file: Path, folder: Path) -> bool:
+    """Whether it is in the folder, or a folder that this one would be made in."""
+    file, folder = file.resolve(), folder.resolve()
+    return file.is_relative_to(folder) or folder.is_relative_to(file)
 
 
 def _off_bus(instance: Instance, stopping: threading.Event, ready: OneReady) -> None:

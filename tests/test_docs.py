@@ -100,6 +100,16 @@ def test_every_command_has_help_with_an_example(command: str) -> None:
     assert f"Example: apartment {command}" in done.stdout
 
 
+def test_every_command_takes_a_configuration() -> None:
+    def lacking(command: Any, *words: str) -> list[str]:
+        inner = getattr(command, "commands", None)
+        if inner is not None:
+            return [one for name, made in inner.items() for one in lacking(made, *words, name)]
+        return [] if any("--config" in one.opts for one in command.params) else [" ".join(words)]
+
+    assert lacking(typer.main.get_command(app)) == []
+
+
 SIMULATED = ["--config", "config/simulated.yaml"]
 
 
@@ -110,6 +120,8 @@ SIMULATED = ["--config", "config/simulated.yaml"]
         (["check", "--config", "nowhere.yaml"], 2),
         (["run", "nobody", *SIMULATED], 2),
         (["history", "Never_Stored", *SIMULATED], 1),
+        (["history", "Kitchen_Light", "--since", "9999999w", *SIMULATED], 2),
+        (["mission", "find", "12345", *SIMULATED], 2),
         (["order", "ip1", "Goto", "Nowhere", *SIMULATED], 1),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -68,6 +69,22 @@ def test_a_service_is_started_again_though_a_process_of_its_own_holds_its_output
     finally:
         for pid in waiting:
             os.kill(pid, signal.SIGKILL)
+
+
+def test_a_state_folder_that_cannot_be_written_is_told_in_a_line(tmp_path: Path) -> None:
+    config = tmp_path / "apartment.yaml"
+    (tmp_path / "home.yaml").write_text("items: {Light: {type: Switch, label: Light}}\n")
+    config.write_text(
+        "home: home.yaml\nstate: home.yaml/state\nbus: {accounts: {persistence: invented}}\n"
+        "persistence: {url: 'sqlite:///bus.db'}\n"
+    )
+    words = [sys.executable, "-m", "services", "serve", "persistence", "--config", str(config)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        f"{config}:1: state: expected a folder that can be written, "
+        f"got {tmp_path}/home.yaml/state/persistence: Not a directory"
+    ]
 
 
 def test_what_others_need_ends_after_them(tmp_path: Path) -> None:

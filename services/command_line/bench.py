@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from services.command_line.options import Json, out
+from services.command_line.options import CONFIG, Json, Unread, out
 from services.errors import Unavailable
 
 SOURCES = Path(__file__).parents[2]
@@ -25,6 +25,7 @@ def bench(
     part: Annotated[str, typer.Option(help="One part, such as bus, persistence, scan, dashboard.")] = "all",
     runs: Annotated[int, typer.Option(help="Runs of each figure; the median counts.", min=1)] = 5,
     kept: Annotated[Path, typer.Option("--out", help="Where the figures are written as JSON.")] = Path("bench.json"),
+    _config: Unread = CONFIG,
     json: Json = False,
 ) -> None:
     """Measure this machine: each figure beside its floor in the same run, on private brokers and databases.

@@ -18,10 +18,14 @@ from services.topics import TABLE
 
 VARIABLE = "_APARTMENT_COMPLETE"  # set by the script in the shell; typer's name for it
 SHELLS = ("bash", "zsh", "fish")
+Unread = Annotated[Path, typer.Option("--config", help="As every command has it; this one does not read it.")]
 Complete = Callable[[typer.Context, str], list[str]]
 
 
-def completion(shell: Annotated[str, typer.Argument(help="bash, zsh or fish.", autocompletion=lambda: SHELLS)]) -> None:
+def completion(
+    shell: Annotated[str, typer.Argument(help="bash, zsh or fish.", autocompletion=lambda: SHELLS)],
+    _config: Unread = Path("config/apartment.yaml"),
+) -> None:
     """Print the script that makes a shell complete commands, services, cameras, items and markers.
 
     bash: eval "$(apartment completion bash)" in ~/.bashrc; zsh: the same in ~/.zshrc, after compinit;

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from services.command_line.options import CONFIG, Unread
+
 app = typer.Typer(no_args_is_help=True, help="Who may open the dashboard.")
 SHORTEST = 8
 
@@ -20,6 +22,7 @@ def about() -> None:
 def user(
     name: str,
     role: Annotated[str, typer.Option(help="viewer (looks only) or operator.")] = "viewer",
+    _config: Unread = CONFIG,
 ) -> None:
     """Ask for a password and print the line for `dashboard.users`: the hash alone stands there."""
     from services.dashboard import passwords  # for this command alone

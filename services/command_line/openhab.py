@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from services import document, secret_store
-from services.command_line.options import CONFIG, Config, Json
+from services.command_line.options import CONFIG, Config, Json, Unread
 from services.config import Apartment, load
 from services.errors import ConfigError
 
@@ -110,6 +110,7 @@ def check_(
     live: Annotated[
         str | None, typer.Option("--live", help="A running OpenHAB (5.1 on) to ask too; its token: OPENHAB_TOKEN.")
     ] = None,
+    _config: Unread = CONFIG,
 ) -> None:
     """Check files of OpenHAB as strictly as it does itself; exit 1 when one has an error."""
     from services.openhab import folder as folders
@@ -149,6 +150,7 @@ def import_(
     out: Annotated[Path, typer.Option("--out", help="Where the home goes.")] = Path("home.yaml"),
     openhab: Annotated[str | None, typer.Option("--openhab", help="Whose grammars; else the best of all.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    _config: Unread = CONFIG,
 ) -> None:
     """Make a home.yaml of a site's items, things and persistence; exit 1 when a file could not be read whole."""
     from services.openhab import folder as folders

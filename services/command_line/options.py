@@ -12,9 +12,10 @@ from services.command_line import completion
 
 CONFIG = Path("config/apartment.yaml")
 Config = Annotated[Path, typer.Option("--config", help="The configuration file.")]
+Unread = completion.Unread
 Json = Annotated[bool, typer.Option("--json", help="Data instead of text.")]
 YesMove = Annotated[bool, typer.Option("--yes-move", help="It may move; else the terminal is asked.")]
 Camera = Annotated[str, typer.Argument(autocompletion=completion.cameras)]
-Marker = Annotated[int, typer.Argument(autocompletion=completion.markers)]
+Marker = Annotated[int, typer.Argument(min=0, max=9999, autocompletion=completion.markers)]
 SERVICES = typer.Argument(autocompletion=completion.services)
 out = Console(soft_wrap=True, highlight=False)

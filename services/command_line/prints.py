@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from services.command_line.options import out
+from services.command_line.options import CONFIG, Unread, out
 from services.errors import ConfigError
 
 Kind = Annotated[str, typer.Option("--board", help="charuco, or chessboard.")]
@@ -27,6 +27,7 @@ def board(
     marker: Inner = None,
     dictionary: Book = "DICT_4X4_50",
     dpi: Annotated[int, typer.Option(min=50, max=2400, help="Of a PNG.")] = 600,
+    _config: Unread = CONFIG,
 ) -> None:
     """Write a board for `calibrate lens`, to be printed at 100 % and glued onto something flat."""
     from services.vision import sheets  # OpenCV, for this command alone
@@ -47,6 +48,7 @@ def markers(
     side: Annotated[float, typer.Option(help="Of the black square, mm.")] = 140.0,
     dictionary: Book = "DICT_5X5_1000",
     dpi: Annotated[int, typer.Option(min=50, max=2400, help="Of a PNG.")] = 600,
+    _config: Unread = CONFIG,
 ) -> None:
     """Write markers to be printed at 100 %, one on each page."""
     from services.vision import sheets

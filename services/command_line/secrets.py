@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from services import secret_store
-from services.command_line.options import CONFIG, Config, out
+from services.command_line.options import CONFIG, Config, Unread, out
 from services.errors import ConfigError
 
 if TYPE_CHECKING:  # certificates, for these commands alone
@@ -44,7 +44,9 @@ def init(
 
 @app.command(epilog="Example: apartment secrets renew --within 60")
 def renew(
-    within: Annotated[int, typer.Option(help="Days that a certificate still holds.")] = 60, out_folder: Out = None
+    within: Annotated[int, typer.Option(help="Days that a certificate still holds.")] = 60,
+    out_folder: Out = None,
+    _config: Unread = CONFIG,
 ) -> None:
     """Renew the certificates that end soon; then reload the broker and restart the dashboard."""
     from services.credentials import folder
@@ -54,7 +56,7 @@ def renew(
 
 
 @app.command(name="set", epilog="Example: apartment secrets set CAMERA_IP1_PASSWORD")
-def set_(name: str, out_folder: Out = None) -> None:
+def set_(name: str, out_folder: Out = None, _config: Unread = CONFIG) -> None:
     """Keep a password that was made elsewhere; it is asked for, or read from standard input."""
     text = typer.prompt("Password", hide_input=True) if sys.stdin.isatty() else sys.stdin.readline().rstrip("\n")
     if not name.replace("_", "").isalnum() or not text.isprintable() or not text:

@@ -50,7 +50,7 @@ def history(
     since: Annotated[str, typer.Option(help="A time, or how long ago: 90m, 24h, 7d.")] = "",
     until: Annotated[str, typer.Option(help="The same; now when not given.")] = "",
     every: Annotated[str, typer.Option(help="Count, least, mean, greatest per 5m, 1h, 1d.")] = "",
-    limit: int = 20,
+    limit: Annotated[int, typer.Option(min=1)] = 20,
     plot: Annotated[Path | None, typer.Option(help="Draw the numbers into this PNG or SVG file.")] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="Comma-separated values.")] = False,
     config: Config = CONFIG,

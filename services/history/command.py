@@ -43,13 +43,13 @@ def moment(text: str, now: float, zone: tzinfo) -> str | None:
     """
     if not text:
         return None
-    if (ago := length_s(text)) is not None:
-        return stamp(now - ago)
     try:
+        if (ago := length_s(text)) is not None:
+            return stamp(now - ago)
         when = datetime.fromisoformat(text)
-    except ValueError as error:
+        return stamp((when if when.tzinfo else when.replace(tzinfo=zone)).timestamp())
+    except (ValueError, OverflowError, OSError) as error:
         raise ConfigError([f"expected how long ago (24h) or a time (2026-01-31T07:05), got {text!r}"]) from error
-    return stamp((when if when.tzinfo else when.replace(tzinfo=zone)).timestamp())
 
 
 def every_s(text: str) -> float | None:

@@ -165,8 +165,9 @@ def test_times_are_an_age_or_the_homes_clock(text: str, wanted: str | None) -> N
 
 
 def test_what_is_no_time_or_length_is_told() -> None:
-    with pytest.raises(ConfigError, match="expected how long ago"):
-        command.moment("soon", 0.0, MADRID)
+    for text in ("soon", "9999999w", f"{'9' * 400}w", "0001-01-01"):
+        with pytest.raises(ConfigError, match=f"expected how long ago .*, got '{text}'"):
+            command.moment(text, 0.0, ZoneInfo("Asia/Tokyo"))
     with pytest.raises(ConfigError, match="expected a length"):
         command.every_s("often")
 
