@@ -148,3 +148,4 @@ def _until_ctrl_c(out: Console, bus: Client) -> None:
         for message in bus.pump(1.0):
             if not message.topic.endswith("/scan/state"):
                 out.print(f"{message.topic}  {message.payload.decode(errors='replace')[:150]}", markup=False)
+        bus.seen.clear()  # it may run for weeks
