@@ -6,7 +6,7 @@ from services.apartment.home import GROUP_ROS
 from services.openhab.mqtt import SILENT
 from services.openhab.reactions import ChannelTriggered, MemberChanged, Reaction, Started, Trigger, reactions
 from services.openhab.site import Site
-from services.openhab.things import SEPARATOR
+from services.openhab.things import SEPARATOR, STATUS
 
 
 def text(site: Site) -> str:
@@ -60,6 +60,7 @@ def _snapshot(site: Site) -> list[str]:
         f'{GROUP_ROS}.members.filter[ one | one.type != "Image" ].forEach[ one |',
         '    bus.publishMQTT("home/" + one.name + "/state", one.state.toString, true)',
         "]",
+        *([] if site.version.has_birth else [f'bus.publishMQTT("{STATUS}", "online", true)']),
     ]
 
 

@@ -8,7 +8,7 @@ from services.apartment.home import GROUP_ROS
 from services.openhab.mqtt import SILENT
 from services.openhab.reactions import ChannelTriggered, MemberChanged, Reaction, Started, Trigger, reactions
 from services.openhab.site import Site
-from services.openhab.things import SEPARATOR
+from services.openhab.things import SEPARATOR, STATUS
 
 HEAD = """const {{ rules, triggers, items, actions }} = require('openhab');
 
@@ -16,24 +16,27 @@ const BROKER = {broker};
 const GROUP = {group};
 const SILENT = {silent}; // they take no commands
 
-function say(name, type, state) {{
-  if (type === 'Image') {{
-    return; // the text of a picture's state is not the picture
-  }}
+function say(topic, text) {{
   const bus = actions.Things.getActions('mqtt', BROKER);
   if (bus === null) {{
     console.warn("the broker's thing is not there yet");
     return;
   }}
-  bus.publishMQTT(`home/${{name}}/state`, state, true);
+  bus.publishMQTT(topic, text, true);
+}}
+
+function sayState(name, type, state) {{
+  if (type !== 'Image') {{ // the text of a picture's state is not the picture
+    say(`home/${{name}}/state`, state);
+  }}
 }}
 """
 PUBLISH = """(event) => {
-    say(event.itemName, items.getItem(event.itemName).type, event.newState);
+    sayState(event.itemName, items.getItem(event.itemName).type, event.newState);
   }"""
-SNAPSHOT = """() => {
-    items.getItem(GROUP).members.forEach((one) => say(one.name, one.type, one.state));
-  }"""
+SNAPSHOT = """() => {{
+    items.getItem(GROUP).members.forEach((one) => sayState(one.name, one.type, one.state));{online}
+  }}"""
 ACCEPT = """(event) => {{
     const text = event.receivedEvent;
     const cut = text.indexOf({separator});
@@ -61,17 +64,20 @@ ACCEPT = """(event) => {{
 def text(site: Site) -> str:
     """The whole file."""
     head = HEAD.format(broker=_js(site.broker.uid), group=_js(GROUP_ROS), silent=json.dumps(SILENT).replace('"', "'"))
-    return "\n".join([head, *(_rule(one) for one in reactions(site))])
+    return "\n".join([head, *(_rule(site, one) for one in reactions(site))])
 
 
 def _js(value: str) -> str:
     return f"'{value}'"
 
 
-def _rule(reaction: Reaction) -> str:
-    execute = {"publish": PUBLISH, "snapshot": SNAPSHOT, "accept": ACCEPT.format(separator=_js(SEPARATOR))}[
-        reaction.act
-    ]
+def _rule(site: Site, reaction: Reaction) -> str:
+    online = "" if site.version.has_birth else f"\n    say({_js(STATUS)}, 'online');"
+    execute = {
+        "publish": PUBLISH,
+        "snapshot": SNAPSHOT.format(online=online),
+        "accept": ACCEPT.format(separator=_js(SEPARATOR)),
+    }[reaction.act]
     listed = ",\n    ".join(trigger(one) for one in reaction.triggers)
     lines = (
         "rules.JSRule({",

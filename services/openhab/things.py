@@ -14,6 +14,7 @@ USER = "openhab"
 PASSWORD = "CHANGE_ME"
 RECONNECT_MS = 5000  # the binding's own minute would leave the bus deaf that long
 SEPARATOR = "#"  # never part of a topic's name, so the first one ends the topic
+STATUS = topics.SERVICE_STATUS.name(service="openhab")
 COMMANDS, UPDATES = "busCommand", "busSet"
 
 
@@ -24,8 +25,7 @@ def lines(site: Site) -> list[ThingLine]:
 
 
 def bridge(site: Site) -> ThingLine:
-    """The broker; its status on the bus is OpenHAB's."""
-    status = topics.SERVICE_STATUS.name(service="openhab")
+    """The broker; its status on the bus is OpenHAB's. Where it cannot say `online` the rules do."""
     settings: dict[str, Setting] = {
         "host": site.broker.host,
         "port": site.broker.port,
@@ -36,7 +36,7 @@ def bridge(site: Site) -> ThingLine:
         "reconnectTime": RECONNECT_MS,
         "username": USER,
         "password": PASSWORD,
-        "lwtTopic": status,
+        "lwtTopic": STATUS,
         "lwtMessage": "offline",
         "lwtQos": 1,
         "lwtRetain": True,
@@ -45,9 +45,9 @@ def bridge(site: Site) -> ThingLine:
         settings |= {"certificatepin": False, "publickeypin": False}
     if site.version.major >= 3:
         settings["enableDiscovery"] = False
-    if site.version.major >= 4:
-        settings |= {"birthTopic": status, "birthMessage": "online", "birthRetain": True}
-        settings |= {"shutdownTopic": status, "shutdownMessage": "offline", "shutdownRetain": True}
+    if site.version.has_birth:
+        settings |= {"birthTopic": STATUS, "birthMessage": "online", "birthRetain": True}
+        settings |= {"shutdownTopic": STATUS, "shutdownMessage": "offline", "shutdownRetain": True}
     channels = () if site.bus == "links" else (_listener(COMMANDS, "command"), _listener(UPDATES, "set"))
     return ThingLine(site.broker.uid, "Broker of the apartment", True, settings=settings, channels=channels)
 

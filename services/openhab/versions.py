@@ -50,6 +50,11 @@ class Version:
         return self.major >= 3
 
     @property
+    def has_birth(self) -> bool:
+        """Whether every release of this series lets the broker's thing say when it is there; 3.4 was the first."""
+        return self.major >= 4
+
+    @property
     def has_start_level(self) -> bool:
         """Whether every release of this series since this one knows the trigger of a start level."""
         return self >= Version(3, 3)

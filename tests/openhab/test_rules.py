@@ -37,9 +37,9 @@ LIMIT_S = 60.0
 pytestmark = [pytest.mark.mosquitto, pytest.mark.node]
 
 
-def script_runs(folder: Path, port: int) -> AbstractContextManager[StandIn]:
+def script_runs(folder: Path, port: int, series: str = "5") -> AbstractContextManager[StandIn]:
     """The generated script, unchanged, with a binding on that port."""
-    written = files(Site(shipped(), parse("5"), bus="js"))
+    written = files(Site(shipped(), parse(series), bus="js"))
     script = folder / "apartment.js"
     script.write_text(written["automation/js/apartment.js"], encoding="utf-8")
     return running(script, written["things/apartment.things"], port, ITEMS, SEPARATOR)
@@ -86,6 +86,21 @@ def test_a_connection_says_all_states_kept(openhab: StandIn, bus: Client) -> Non
         state(bus, item, text)
     assert all(line["retained"] for line in openhab.lines("publish"))
     assert published(openhab, "Still") == published(openhab, "Secret") == []
+
+
+def test_before_the_birth_message_the_rules_say_that_it_is_there_after_all_states(
+    tmp_path: Path, mosquitto_broker: mosquitto.Broker, bus: Client
+) -> None:
+    bus.subscribe("service/openhab/status")
+    try:
+        with script_runs(tmp_path, mosquitto_broker.port, "3") as openhab:
+            settled(openhab)
+            bus.until(lambda one: (one.topic, one.payload) == ("service/openhab/status", b"online"), LIMIT_S, "online")
+            *states, last = openhab.lines("publish")
+    except peers.Missing as missing:
+        pytest.skip(str(missing))
+    assert last == {"publish": "service/openhab/status", "value": "online", "retained": True}
+    assert {line["publish"] for line in states} == {f"home/{item}/state" for item in STATES}
 
 
 def test_a_change_of_a_member_is_said_and_of_another_is_not(openhab: StandIn, bus: Client) -> None:
@@ -169,6 +184,14 @@ def test_a_broker_that_forgot_everything_is_told_all_states_again(tmp_path: Path
         bus = stack.enter_context(connected(BusSettings(port=port), ("home/#",), timeout_s=LIMIT_S))
         for item, text in {**STATES, "Lamp": "ON"}.items():
             state(bus, item, text)
+
+
+@pytest.mark.parametrize(("series", "count"), [("2.5", 1), ("3", 1), ("4", 0), ("5", 0)])
+def test_its_own_language_says_that_it_is_there_where_the_binding_does_not(series: str, count: int) -> None:
+    written = files(Site(shipped(), parse(series), bus="dsl"))
+    said = 'bus.publishMQTT("service/openhab/status", "online", true)'
+    assert written["rules/apartment.rules"].count(said) == count
+    assert ('birthTopic="service/openhab/status"' in written["things/apartment.things"]) == (count == 0)
 
 
 def spoken(trigger: dict[str, Any]) -> str:
