@@ -12,7 +12,7 @@ import pytest
 from pydantic import SecretStr, ValidationError
 
 from services.apartment.home import Home, Item
-from services.bus import SESSION_TOPIC, Message, topic_matches
+from services.bus import SESSION_TOPIC, Delivery, Message, topic_matches
 from services.errors import BadMessage, Unavailable
 from services.payloads import Diagnostic, OrderResult, stamp
 from services.payloads.robot import MissionResult, MissionState
@@ -206,6 +206,16 @@ def test_orders_with_an_id_that_was_used_before_are_rows_of_their_own(database: 
         ("ip1", "o1", "done"), ("ip2", "o1", "failed"), ("ip1", "O1", "refused"),
         ("ip1", "o1", "cancelled"), ("ip1", "o1", "refused"),
     ]  # fmt: skip
+
+
+def test_an_order_that_the_broker_sends_again_is_no_second_one(database: Database) -> None:
+    told = [ordered("accepted", 1), ordered("running", 2), ordered("done", 3)]
+    for again in (False, True):
+        sent = (one._replace(token=Delivery(1, packet, again)) for packet, one in enumerate(told, 7))
+        with running(database) as service:
+            turn(service, *sent, now=T + 9)
+            assert service.counters["redelivered"] == (3 if again else 0)
+    assert database.rows("SELECT order_id, state FROM camera_order") == [("o1", "done")]
 
 
 def test_a_mission_is_one_row_and_another_with_its_id_a_second(database: Database) -> None:
