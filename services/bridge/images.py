@@ -27,7 +27,10 @@ def one_thread() -> None:
 
 def pixels(jpeg: bytes) -> NDArray[np.uint8]:
     """BGR (h, w, 3) of a JPEG or PNG; BadMessage when the data make no picture."""
-    found = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if jpeg else None
+    try:
+        found = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if jpeg else None
+    except cv2.error as error:  # it says that it has thousands of millions of pixels
+        raise BadMessage(f"expected a JPEG: {error.err}") from error
     if found is None:
         raise BadMessage("expected a JPEG")
     return np.asarray(found, np.uint8)

@@ -6,12 +6,15 @@ import uuid
 from collections.abc import Iterable
 from math import inf
 
+from pydantic import ValidationError
+
 from services import topics
 from services.bridge.hatch import BASE
 from services.bridge.node import Call, Node, Ports, Server
 from services.bridge.part import Part
 from services.bridge.rules import Heard
 from services.bus import Message
+from services.errors import BadMessage
 from services.payloads import Order, OrderResult
 
 SERVICE = "/set_camera_info"
@@ -33,11 +36,17 @@ class Lenses(Part):
 
     def called(self, name: str, call: Call, now: float) -> Iterable[Message]:
         """See `Part`."""
-        info, order = call.fields["camera_info"], f"lens-{uuid.uuid4().hex[:12]}"
-        self._waiting[order] = (now + ANSWER_S, call)
-        self.due = min(self.due, now + ANSWER_S)
+        info, named = call.fields["camera_info"], f"lens-{uuid.uuid4().hex[:12]}"
         value = {key: list(info[key]) if isinstance(info[key], list | tuple) else info[key] for key in TOLD}
-        return [topics.CAMERA_ORDER.message(Order(value=value, id=order), cam=self._cameras[name], key=KEY)]
+        try:
+            order = Order(value=value, id=named)
+        except ValidationError as error:
+            why = "expected finite numbers in camera_info"
+            call.answer({"success": False, "status_message": why})
+            raise BadMessage(f"{name}: {why}") from error
+        self._waiting[named] = (now + ANSWER_S, call)
+        self.due = min(self.due, now + ANSWER_S)
+        return [topics.CAMERA_ORDER.message(order, cam=self._cameras[name], key=KEY)]
 
     def hear(self, heard: Heard, now: float) -> None:
         """See `Part`."""

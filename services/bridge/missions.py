@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from services import topics
@@ -17,6 +18,7 @@ ORDER, STATE, CANCEL = "/iot_mission", "/iot_mission/state", "/iot_mission/cance
 KEY_VALUE = "diagnostic_msgs/KeyValue"
 MOST = 2.0  # orders a second; to cancel is never one too many
 FIND = "find"  # the one key of an order; its value is the marker
+MARKER = re.compile("[0-9]{1,4}")
 
 
 class Missions(Part):
@@ -40,8 +42,8 @@ class Missions(Part):
 
     def heard_ros(self, topic: str, fields: Fields, now: float) -> Iterable[Message]:
         """See `Part`."""
-        key, value = str(fields["key"]), str(fields["value"])
-        if key.lower() != FIND or not value.strip().isdigit() or int(value) > 9999:
+        key, value = str(fields["key"]), str(fields["value"]).strip()
+        if key.lower() != FIND or not MARKER.fullmatch(value):
             raise BadMessage(f"expected key {FIND} and a marker's number as value")
         self._allowance.take(ORDER, MOST, now)
         return [self._order(MissionOrder(find=int(value)))]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from math import pi
+from math import inf, nan, pi
 from pathlib import Path
 from typing import Any
 
@@ -180,6 +180,15 @@ def test_a_calibration_is_handed_to_the_camera_and_its_word_to_the_calibrator(
     assert answers == [answer]
 
 
+@pytest.mark.parametrize("change", [{"K": [nan] * 9}, {"D": [0.1, inf, 0, 0, 0]}])
+def test_a_calibration_without_numbers_is_refused_at_once(bridge: Driven, change: Any) -> None:
+    answers: list[Any] = []
+    bridge.node.call("/set_camera_info", {"camera_info": {**INFO, **change}}, answers.append)
+    with pytest.raises(BadMessage, match="set_camera_info: expected finite numbers"):
+        list(bridge.service.handle(bridge.take()[0], NOW))
+    assert answers == [{"success": False, "status_message": "expected finite numbers in camera_info"}]
+
+
 def test_a_calibration_that_nobody_takes_is_told(bridge: Driven) -> None:
     answers: list[Any] = []
     bridge.node.call("/ip2/set_camera_info", {"camera_info": INFO}, answers.append)
@@ -207,7 +216,10 @@ def test_a_mission_is_ordered_followed_and_cancelled(bridge: Driven) -> None:
     assert (answers[0]["success"], asked) == (True, ["mission/tiago/order"])
 
 
-@pytest.mark.parametrize(("key", "value"), [("find", "a marker"), ("find", "-1"), ("find", "10000"), ("eat", "582")])
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("find", "a marker"), ("find", "-1"), ("find", "10000"), ("find", "²"), ("find", "9" * 5000), ("eat", "582")],
+)
 def test_another_word_to_the_mission_is_refused(bridge: Driven, key: str, value: str) -> None:
     with pytest.raises(BadMessage, match="expected key find"):
         bridge.robot_says("/iot_mission", key, value)

@@ -15,6 +15,7 @@ from services.bridge.rules import Fields
 from services.vision.frames import Array, Transform
 
 KEPT = 60  # transforms of one child: what 20 a second say in three seconds
+FARTHEST = 1e9  # metres
 LONGEST = 50  # frames in a chain; more is a ring
 
 
@@ -28,10 +29,14 @@ class Chain:
         """Takes a TFMessage's transforms; `fixed`: those of /tf_static."""
         for one in transforms:
             child, header = _plain(one["child_frame_id"]), one["header"]
+            try:
+                there = transform(one["transform"])
+            except ValueError:  # tf leaves them out as well, and says so
+                continue
             known = self._said.setdefault(child, deque(maxlen=KEPT))
             if fixed:
                 known.clear()
-            known.append((float(header["stamp"]), _plain(header["frame_id"]), transform(one["transform"])))
+            known.append((float(header["stamp"]), _plain(header["frame_id"]), there))
 
     def between(self, parent: str, child: str, stamp: float | None = None) -> Transform | None:
         """The child in its (grand)parent; None when nobody has said so. `stamp`: when, as near as it is known."""
@@ -52,11 +57,14 @@ class Chain:
 
 
 def transform(fields: Fields) -> Transform:
-    """Of a geometry_msgs/Transform, or of a Pose."""
+    """Of a geometry_msgs/Transform, or of a Pose; ValueError when it is nowhere: NaN, or too far."""
     at = fields.get("translation") or fields["position"]
     turned = fields.get("rotation") or fields["orientation"]
     q = np.array([float(turned[name]) for name in "xyzw"])
-    return Transform(_rotation(q), np.array([float(at[name]) for name in "xyz"]))
+    place = np.array([float(at[name]) for name in "xyz"])
+    if not (np.abs([*place, *q]) <= FARTHEST).all():
+        raise ValueError(f"expected finite numbers up to {FARTHEST:g}")
+    return Transform(_rotation(q), place)
 
 
 def yaw_deg(where: Transform) -> float:

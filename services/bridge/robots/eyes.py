@@ -21,6 +21,7 @@ from services.vision.frames import Array, Transform
 from services.vision.lens import Lens
 from services.vision.pose import View, locate
 
+MOST = 1e9  # of a lens; what is larger overflows
 PIXELS = {"bgr8": 3, "rgb8": 3, "8UC3": 3, "bgra8": 4, "rgba8": 4, "mono8": 1, "8UC1": 1}  # bytes, by encoding
 
 
@@ -33,8 +34,8 @@ def picture(fields: Fields) -> Picture:
         raise BadMessage(f"expected an encoding of {', '.join(PIXELS)}, got {encoding!r:.80}")
     height, width, step, size = int(fields["height"]), int(fields["width"]), int(fields["step"]), PIXELS[encoding]
     data = np.frombuffer(fields["data"], np.uint8)
-    if data.size != height * step or step < width * size:
-        raise BadMessage(f"expected {height} rows of {step} bytes, got {data.size} bytes")
+    if data.size != height * step or step < width * size or not width * height:
+        raise BadMessage(f"expected {height} rows of {step} bytes, {width} pixels in each, got {data.size} bytes")
     rows = data.reshape(height, step)[:, : width * size].reshape(height, width, size)
     if size == 1:
         return np.ascontiguousarray(rows[..., 0])
@@ -42,10 +43,10 @@ def picture(fields: Fields) -> Picture:
 
 
 def lens(info: Fields) -> Lens | None:
-    """Of a sensor_msgs/CameraInfo; None for a camera that is not calibrated (all zeros, as ROS has it)."""
+    """Of a sensor_msgs/CameraInfo; None for a camera that is not calibrated (all zeros, as ROS has it), or to NaN."""
     matrix = np.array([float(number) for number in info["K"]]).reshape(3, 3)
     bends = [float(number) for number in info["D"]]
-    if matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or len(bends) > 8:
+    if matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or len(bends) > 8 or not (np.abs([*matrix.flat, *bends]) <= MOST).all():
         return None
     bends += [0.0] * ((8 if len(bends) > 5 else 5) - len(bends))
     return Lens(int(info["width"]), int(info["height"]), matrix, np.array(bends))

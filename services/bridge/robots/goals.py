@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 from services.bridge.robots.actions import ENDED, ONGOING, Action
 from services.bridge.rules import Fields
+from services.payloads import LONGEST_ID
 from services.payloads.robot import GotoResult
 
 AGAIN_S = 1.0  # between two sendings of a goal that the server has not named
@@ -24,6 +25,7 @@ TAKEN_S = 4.0  # until it must have; who ordered it waits 5 s before he orders i
 SILENT_S = 5.0  # of the server's status, which comes five times a second
 FORGOTTEN_S = 2.0  # of statuses without the goal
 NAMELESS = "~"  # begins the name of a goal that has no id on the bus
+LONGEST_TEXT = 400  # characters of a server's reason
 REMEMBERED = 50  # goals whose end is told once more when they are ordered again
 
 
@@ -145,7 +147,7 @@ class Goals:
             self._cancelled = {**dict(list(self._cancelled.items())[-REMEMBERED:]), name: now}
             yield Send(action.cancel, {"id": name})
         ours = name.removeprefix(self._prefix)
-        if ours not in self._ends and not ours.startswith(NAMELESS):
+        if ours not in self._ends and not ours.startswith(NAMELESS) and len(ours) <= LONGEST_ID:
             end = _end(ENDED[status], text) if status in ENDED else ("cancelled", "nobody was there to follow it")
             told = GotoResult.model_validate({"id": ours, "state": end[0], "reason": end[1]})
             self._remember(told)
@@ -191,6 +193,7 @@ def _cancel(goal: Goal) -> Send:
 
 def _end(word: str, text: str) -> tuple[str, str]:
     """How a goal ended, for the bus, by the server's word."""
+    text = text[:LONGEST_TEXT]
     if word == "succeeded":
         return "arrived", text
     if word in ("preempted", "recalled"):

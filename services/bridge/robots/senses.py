@@ -12,6 +12,7 @@ import os
 import signal
 import threading
 import time
+from contextlib import suppress
 from math import inf
 from multiprocessing.connection import Connection
 
@@ -119,7 +120,8 @@ class Senses:
             if topic in (TF, TF_STATIC):
                 self._chain.note(fields["transforms"], fixed=topic == TF_STATIC)
             elif topic == self._wanted.amcl_pose:
-                self._amcl = now, chain.transform(fields["pose"]["pose"])
+                with suppress(ValueError):
+                    self._amcl = now, chain.transform(fields["pose"]["pose"])
             else:
                 self._newest[topic] = now, fields
 
@@ -168,9 +170,11 @@ class Senses:
             return self._chain.between(self._wanted.map_frame, str(header["frame_id"]), float(header["stamp"]))
 
     def _told(self, fields: Fields) -> list[SeenMarker]:
-        if "header" not in fields:
-            raise BadMessage("expected a fiducial_msgs/FiducialTransformArray, without a header")
-        return eyes.told(fields, self._camera(fields["header"]))
+        try:
+            camera = self._camera(fields["header"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise BadMessage("expected a fiducial_msgs/FiducialTransformArray, without a header") from error
+        return eyes.told(fields, camera)
 
     def _pictured(self, fields: Fields) -> list[SeenMarker]:
         wanted = self._wanted

@@ -27,6 +27,7 @@ from services.bridge.robots.kept import Kept
 from services.bridge.robots.pipe import Felt, UnderWay, Wanted
 from services.bridge.rules import Fields, Heard
 from services.bus import Message
+from services.errors import BadMessage
 from services.payloads.robot import GotoResult, MissionState, RobotCancel, RobotGoto, RobotPose, RobotSeen
 from services.section import Section
 
@@ -180,8 +181,8 @@ class Tiago(Part):
         """See `Part`."""
         if topic in self._status:
             self._take(self.goals.status(self._status[topic], fields["status_list"], now))
-        elif "status" in fields:
-            self._take(self.goals.result(self._result[topic], fields["status"], now))
+        else:
+            self._take(self.goals.result(self._result[topic], _goal_status(fields), now))
         return self._news()
 
     def tick(self, node: Node, now: float) -> Iterable[Message]:
@@ -271,6 +272,19 @@ class Tiago(Part):
                 self._felt = said
         if self._child.tend(now):
             self._felt, self._told = None, None
+
+
+def _goal_status(result: Fields) -> Fields:
+    """The GoalStatus in an action's result, whose type is its publisher's choice; BadMessage when it has none."""
+    try:
+        told = result["status"]
+        return {
+            "goal_id": {"id": str(told["goal_id"]["id"])}, "status": int(told["status"]), "text": str(told["text"]),
+        }  # fmt: skip
+    except (KeyError, TypeError, ValueError) as error:
+        raise BadMessage(
+            f"expected an action's result, with an actionlib_msgs/GoalStatus as status: {error}"
+        ) from error
 
 
 def _age(seconds: float) -> str:

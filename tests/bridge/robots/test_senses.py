@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from math import inf
+from math import inf, nan
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from tests.bridge.test_service import CONFIG
 
 WALL = 1_000_000.0
 UPRIGHT = Transform(np.eye(3), np.zeros(3))
+BOMB = b"P6 60000 60000 255\n" + bytes(100)  # a picture of three thousand million pixels, so it says
 IMAGE, INFO, FIDUCIALS = "/eye/image_raw", "/eye/camera_info", "/fiducial_transforms"
 
 
@@ -101,6 +102,31 @@ def test_tf_goes_before_amcl_and_both_are_said_at_their_pace() -> None:
     assert sensing.senses.felt().picture_age_s == inf
 
 
+@pytest.mark.parametrize("number", [nan, inf, -1e308])
+def test_a_frame_that_is_nowhere_is_left_out_as_tf_does_it(number: float) -> None:
+    sensing = Sensing(amcl_pose="/amcl_pose")
+    nowhere = frame("map", "base_link", at(number, 2.0))
+    sensing.says("/tf", {"transforms": [nowhere, frame("odom", "other", UPRIGHT)]})
+    pose = {"position": dict.fromkeys("xyz", number), "orientation": dict.fromkeys("xyzw", 0.0)}
+    sensing.says("/amcl_pose", {"pose": {"pose": pose}})
+    assert sensing.turn() == []
+    sensing.says("/tf", {"transforms": [nowhere, frame("map", "base_link", at(1.0, 2.0))]})
+    (said,) = sensing.turn()
+    assert isinstance(said, RobotPose)
+    assert (said.x, said.y) == (1.0, 2.0)
+
+
+@pytest.mark.parametrize("change", [{"K": [nan] * 9}, {"K": [1e308] * 9}, {"D": [inf] * 5}, {"D": [1e300] * 5},
+                                    {"K": [1e-300, 0, 0, 0, 1e-300, 0, 0, 0, 1]}])  # fmt: skip
+def test_a_lens_that_is_none_shows_which_marker_it_is_but_not_where(change: Any) -> None:
+    world = load(CONFIG / "world.yaml")
+    marker = world.marker(582).pose.translation
+    camera = at(float(marker[0]) - 0.1, float(marker[1]) - 1.2, 85.0) @ eye.in_base(1.1, 22.0)
+    lens = eyes.lens({**eye.camera_info(), **change})
+    seen = eyes.look(eye.Eye(world, 1).picture(camera), "DICT_5X5_1000", lens, camera, {}, 0.14)
+    assert [one.position for one in seen if one.marker == 582] == [None]
+
+
 def test_a_marker_in_its_picture_is_where_it_is_in_the_map() -> None:
     """The picture of the simulated robot's camera, from a place where marker 582 is before it."""
     world = load(CONFIG / "world.yaml")
@@ -155,7 +181,10 @@ def test_pictures_of_all_encodings_are_read(encoding: str) -> None:
     [
         {"encoding": "bayer_rggb8", "height": 1, "width": 1, "step": 1, "data": b"x"},
         {"encoding": "mono8", "height": 2, "width": 2, "step": 2, "data": b"x"},
+        {"encoding": "mono8", "height": 0, "width": 0, "step": 0, "data": b""},
+        {"encoding": "bgr8", "height": 2, "width": 0, "step": 1, "data": b"xx"},
         {"data": b"no picture"},
+        {"data": BOMB},
         {"data": b""},
     ],
 )
@@ -171,7 +200,12 @@ def test_what_aruco_detect_says_is_taken_as_it_is_and_rubbish_is_not() -> None:
     sensing.says(FIDUCIALS, {"header": header, "transforms": [one]})
     ((found,),) = sensing.seen()
     assert (found.marker, found.position, found.distance) == (7, None, 2.0), "no frames yet: seen, but not where"
-    for rubbish in ({"data": 3}, {"header": header}, {"header": header, "transforms": [{"id": 3}]}):
+    nowhere = {**one["transform"], "translation": dict.fromkeys("xyz", nan)}
+    for rubbish in (
+        {"data": 3}, {"header": header}, {"header": header, "transforms": [{"id": 3}]}, {"header": 3, "transforms": []},
+        {"header": {"stamp": "now", "frame_id": "eye"}, "transforms": []},
+        {"header": header, "transforms": [{**one, "transform": nowhere}]}, {"header": header, "transforms": 3},
+    ):  # fmt: skip
         sensing.senses._look_due = 0.0
         sensing.says(FIDUCIALS, rubbish)
         assert sensing.seen() == []
