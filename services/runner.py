@@ -151,6 +151,8 @@ class Runner:
         try:
             for said in self.service.tick(now):
                 self._publish(said)
+        except BadMessage as error:  # what it has taken cannot be said
+            self._dropped("bad", str(error), now)
         except DeviceError as error:
             self._dropped("device_errors", str(error), now)
 

@@ -34,7 +34,7 @@ class Probe:
         self.due: float | None = None
         self.handled: list[str] = []
         self.ticks = 0
-        self.away = False
+        self.away = self.unsaid = False
         self.counters = {"mine": 7}
 
     def handle(self, message: Message, now: float) -> Iterable[Message]:
@@ -55,6 +55,8 @@ class Probe:
         self.ticks += 1
         if self.away:
             raise Unavailable("database")
+        if self.unsaid:
+            raise BadMessage("a year that nobody can say")
         return ()
 
 
@@ -105,6 +107,16 @@ def test_a_bad_message_or_a_device_that_fails_is_counted_and_the_turn_goes_on(te
     bench.runner.turn()
     assert bench.probe.handled == ["a", text, "b"]
     assert bench.runner.info().counters[counter] == 1
+
+
+def test_a_tick_that_cannot_say_something_is_counted_and_the_service_goes_on() -> None:
+    bench = Bench()
+    bench.probe.unsaid = True
+    bench.say("a")
+    bench.runner.turn()
+    assert bench.runner.info().counters["bad"] == 1
+    assert bench.unacknowledged() == []
+    assert bench.runner.turn(), "its own answer"
 
 
 def test_while_something_is_away_nothing_is_acknowledged_or_taken_and_then_all_is_done_once() -> None:

@@ -17,6 +17,7 @@ FROM_ROS = "/ros"  # before the ROS topic: `/ros/iot_command`
 CALLED = "/ros-call"  # before the name of the ROS service
 LINK = "/bridge/link"
 ANY = "*"  # type of an inlet: whatever its publisher says that it is, installed or not
+Say = Callable[[], None]
 CALL_S = 30.0  # a call that we have not answered by then fails
 
 
@@ -84,11 +85,14 @@ class Link:
 class Node(Protocol):
     """A ROS node as the service sees it. All calls come from the main thread and none waits for anything."""
 
-    def publish(self, topic: str, fields: Fields, key: str = "") -> None:
-        """Says it with the next `flush`; `key`: whose newest message this is, on a topic with replay.
+    def prepare(self, topic: str, fields: Fields, key: str = "") -> Say:
+        """What says it with the next `flush`; `key`: whose newest message this is, on a topic with replay.
 
         BadMessage when the fields do not fit the topic's type.
         """
+
+    def publish(self, topic: str, fields: Fields, key: str = "") -> None:
+        """Prepares and says it."""
 
     def flush(self) -> None:
         """Sends what was published since, as far as somebody listens."""

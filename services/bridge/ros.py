@@ -18,7 +18,7 @@ from typing import Any
 
 from services.bridge import arguments, definitions, messages, reach
 from services.bridge.doubled import doubled
-from services.bridge.node import ANY, CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Server
+from services.bridge.node import ANY, CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Say, Server
 from services.bridge.outgoing import Outgoing
 from services.bridge.rules import Fields
 from services.bridge.simtime import SimulatedTime
@@ -67,14 +67,17 @@ class RosNode:
         self._registrar = threading.Thread(target=self._register, name="ros-registrar", daemon=True)
         self._registrar.start()
 
-    def publish(self, topic: str, fields: Fields, key: str = "") -> None:
+    def prepare(self, topic: str, fields: Fields, key: str = "") -> Say:
         """See `Node`."""
         outlet = self._outlets[topic]
         message = messages.build(self._classes[topic], fields)
         self._clock.move(message)
-        self._outgoing[topic].say(
-            messages.on_the_wire(message), (key if outlet.replay else "") if outlet.replay or outlet.latch else None
-        )
+        kept = (key if outlet.replay else "") if outlet.replay or outlet.latch else None
+        return partial(self._outgoing[topic].say, messages.on_the_wire(message), kept)
+
+    def publish(self, topic: str, fields: Fields, key: str = "") -> None:
+        """See `Node`."""
+        self.prepare(topic, fields, key)()
 
     def flush(self) -> None:
         """See `Node`."""

@@ -15,7 +15,7 @@ from services import states, topics
 from services.apartment.home import Home, Item
 from services.bridge import limits, rulebook
 from services.bridge.health import Health
-from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Node
+from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Node, Say
 from services.bridge.pace import Pace
 from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard, Rule, read, to_mqtt, to_ros
@@ -51,7 +51,7 @@ class Bridge:
             if rule.direction == "to_mqtt":
                 self._to_mqtt[rule.ros].append(rule)
         self._allowance = limits.Allowance()
-        self._slow_to_ros: Pace[tuple[str, Fields, str]] = Pace()
+        self._slow_to_ros: Pace[Say] = Pace()
         self._slow_to_mqtt: Pace[Message] = Pace()
         rows = (topics.DIAGNOSTICS, *(row for part in parts for row in part.rows))
         self.subscribes = _apart([*(rule.filter for rule in self._to_ros), *(row.filter for row in rows)])
@@ -136,11 +136,11 @@ class Bridge:
         topic = heard.message.topic
         try:
             fields = to_ros(rule, heard)
-            if fields is not None and rule.rate is not None:
-                said = self._slow_to_ros.take((rule.ros, topic), rule.rate, (rule.ros, fields, topic), now)
-                fields = said[1] if said else None
-            if fields is not None:
-                self.node.publish(rule.ros, fields, key=topic)
+            say = self.node.prepare(rule.ros, fields, key=topic) if fields is not None else None
+            if say is not None and rule.rate is not None:
+                say = self._slow_to_ros.take((rule.ros, topic), rule.rate, say, now)
+            if say is not None:
+                say()
                 self.counters["to_ros"] += 1
         except BadMessage as error:
             return BadMessage(f"{topic} to {rule.ros}: {error}")
@@ -148,8 +148,8 @@ class Bridge:
 
     def _what_waited(self, now: float) -> Iterator[Message]:
         """What came faster than its rule allows, as far as its time has come."""
-        for topic, fields, key in self._slow_to_ros.ready(now):
-            self.node.publish(topic, fields, key=key)
+        for say in self._slow_to_ros.ready(now):
+            say()
             self.counters["to_ros"] += 1
         for message in self._slow_to_mqtt.ready(now):
             self.counters["to_mqtt"] += 1

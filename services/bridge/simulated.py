@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 
-from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Ports
+from services.bridge.node import CALLED, FROM_ROS, LINK, Call, Link, Ports, Say
 from services.bridge.rules import Fields
 from services.bus import Message
 from services.errors import BadMessage
@@ -29,12 +30,13 @@ class SimulatedNode:
         self.published: deque[tuple[str, Fields]] = deque(maxlen=REMEMBERED)
         post(Message(LINK, value=Link(up=True, text="simulated, no ROS", registrations=1)))
 
+    def prepare(self, topic: str, fields: Fields, key: str = "") -> Say:
+        """See `Node`; here every topic takes any fields."""
+        return partial(self._say, topic, fields, key)
+
     def publish(self, topic: str, fields: Fields, key: str = "") -> None:
         """See `Node`."""
-        outlet = self._outlets[topic]
-        if outlet.replay or outlet.latch:
-            self._kept.setdefault(topic, {})[key if outlet.replay else ""] = fields
-        self._say(topic, fields)
+        self.prepare(topic, fields, key)()
 
     def flush(self) -> None:
         """See `Node`; here everything is said at once."""
@@ -42,8 +44,8 @@ class SimulatedNode:
     def refresh(self) -> None:
         """See `Node`."""
         for topic, outlet in self._outlets.items():
-            for fields in self._kept.get(topic, {}).values() if outlet.replay else ():
-                self._say(topic, fields)
+            for key, fields in list(self._kept.get(topic, {}).items()) if outlet.replay else ():
+                self._say(topic, fields, key)
 
     def listeners(self, topic: str) -> int:
         """See `Node`."""
@@ -71,7 +73,10 @@ class SimulatedNode:
             raise BadMessage(f"expected one of {', '.join(sorted(self._servers))}, got {name!r}")
         self._post(Message(CALLED + name, value=Call(fields, answer)))
 
-    def _say(self, topic: str, fields: Fields) -> None:
+    def _say(self, topic: str, fields: Fields, key: str) -> None:
+        outlet = self._outlets[topic]
+        if outlet.replay or outlet.latch:
+            self._kept.setdefault(topic, {})[key if outlet.replay else ""] = fields
         self.published.append((topic, fields))
         for hear in self._subscribers.get(topic, ()):
             hear(fields)

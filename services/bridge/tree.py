@@ -11,11 +11,13 @@ from services.bridge.node import Node, Outlet, Ports
 from services.bridge.part import Part
 from services.bridge.rules import Fields, Heard
 from services.bus import Message
+from services.errors import BadMessage
 from services.payloads import CameraStatus, Position, ScanResult, seconds
 from services.vision.frames import Mount
 
 TF, TF_STATIC, JOINTS = "/tf", "/tf_static", "/joint_states"
 EVERY_S = 0.1  # who looks a frame up wants one before and one after the time of its picture
+LAST_S = 2.0**32  # since 1970, the first time that ROS cannot say
 SEEN = ("online", "degraded")  # states of a camera whose position is known
 
 
@@ -47,6 +49,10 @@ class Tree(Part):
         elif isinstance(said, CameraStatus):
             (self._away.discard if said.state in SEEN else self._away.add)(cam)
         elif isinstance(said, ScanResult):
+            if not 0 <= seconds(said.stamp) < LAST_S:
+                raise BadMessage(
+                    f"{heard.message.topic}: expected a stamp that ROS can say, 1970 to 2106, got {said.stamp}"
+                )
             older = self._markers.get(said.marker)
             if older is None or seconds(older.stamp) <= seconds(said.stamp):
                 self._markers[said.marker] = said

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import random
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from services import states
+from services import states, topics
 from services.apartment.home import Home
 from services.apartment.robot_places import Relation
 from services.bridge import node, rulebook
@@ -19,32 +20,42 @@ from services.bridge.missions import Missions
 from services.bridge.part import Part
 from services.bridge.robots.kept import Kept
 from services.bridge.robots.tiago import Settings, Tiago
-from services.bridge.rules import read
+from services.bridge.rules import Fields, Rule, read
 from services.bridge.service import Bridge
 from services.bridge.simulated import SimulatedNode
 from services.bridge.snapshots import Snapshots
 from services.bridge.tree import Tree
-from services.bus import Message
+from services.bus import Message, topic_matches
 from services.errors import BadMessage
 from tests.bridge.robots.test_tiago import OURS, PLACES
-from tests.bridge.test_service import CONFIG, NOW
-from tests.fuzz.payloads import TEXTS
+from tests.bridge.test_service import CONFIG, NOW, RESULT
+from tests.fuzz import payloads
 
 pytestmark = pytest.mark.ros
 pytest.importorskip("genpy", reason="apt-get install python3-genpy and message packages")
 
-from services.bridge.messages import ARRAY, fields_of, message_class, service_class  # noqa: E402
+from services.bridge.messages import ARRAY, build, fields_of, message_class, on_the_wire, service_class  # noqa: E402
 
 DRAWS = 2000  # of each topic
 CALLS = 40  # of each service
 ITEMS = {kind: {"type": kind, "label": kind} for kind in states.ITEM_TYPES}
 WORDS = (*["find", "582"] * 8, "Zoom", "AudioRec", "Scan", "SetTarget", "Move", "tiago", "²", "9" * 5000, "٣", "0x10",
          "1e400", "{}", '{"value": NaN}', '{"id": 3}', '{"targets": [1e999]}', OURS, f"{OURS}g", f"{OURS}{'x' * 100}",
-         *ITEMS, *(text.encode(errors="replace").decode() for text in TEXTS))  # fmt: skip
+         *ITEMS, *(text.encode(errors="replace").decode() for text in payloads.TEXTS))  # fmt: skip
 NUMBERS = (0.0, -0.0, 1.0, -1.5, 1e-320, 1e308, -1e308, float("nan"), float("inf"), float("-inf"))
 BITS = {"byte": 8, "char": 8, **{f"{sign}int{bits}": bits for sign in ("", "u") for bits in (8, 16, 32, 64)}}
 ANYTHING = ("std_msgs/String", "actionlib_msgs/GoalStatus", "actionlib_msgs/GoalStatusArray", "std_msgs/Empty",
             "diagnostic_msgs/DiagnosticStatus", "sensor_msgs/CameraInfo", "geometry_msgs/PoseStamped")  # fmt: skip
+
+
+class Strict(SimulatedNode):
+    """Builds what it publishes, as the node over rospy does."""
+
+    def prepare(self, topic: str, fields: Fields, key: str = "") -> node.Say:
+        kind = next(one.type for one in self.ports.outlets if one.topic == topic)
+        if message_class(kind) is not None:  # move_base's goals need not be installed
+            on_the_wire(build(message_class(kind), fields))
+        return super().prepare(topic, fields, key)
 
 
 @pytest.fixture
@@ -59,7 +70,7 @@ def bridge() -> Bridge:
     outlets += [one for each in ports for one in each.outlets]
     inlets, servers = ([one for each in ports for one in getattr(each, what)] for what in ("inlets", "servers"))
     whole = node.Ports(tuple(outlets), tuple(inlets), tuple(servers))
-    return Bridge(home, rules, SimulatedNode(whole, lambda _: None), tuple(parts))
+    return Bridge(home, rules, Strict(whole, lambda _: None), tuple(parts))
 
 
 def drawn(rng: random.Random, slot: str) -> Any:
@@ -115,6 +126,51 @@ def test_a_word_on_any_topic_is_taken_or_refused(bridge: Bridge) -> None:
             told = anything(rng) if inlet.type == node.ANY else fields(rng, message_class(inlet.type))
             said += refused(bridge, Message(node.FROM_ROS + inlet.topic, value=told))
         assert said < DRAWS, inlet.topic
+
+
+def test_a_word_on_the_bus_is_taken_or_refused_before_it_is_to_be_said(bridge: Bridge) -> None:
+    rng, levels = (
+        random.Random(1),
+        {"cam": "ip1", "robot": "tiago", "component": "a", "service": "mission", "marker": "5"},
+    )
+    heard = 0
+    for row in topics.TABLE:
+        names = {name: levels.get(name, "Switch") for name in row.names}
+        if not any(topic_matches(wanted, row.filter_for(**names)) for wanted in bridge.subscribes):
+            continue
+        heard += 1
+        for _ in range(DRAWS // 4):
+            refused(bridge, Message(row.name(**names), payloads.drawn(rng, row), received=NOW))
+    assert heard > 10
+
+
+@pytest.mark.parametrize("stamp", ["1969-12-31T23:59:59Z", "2106-02-07T06:28:16Z", "9999-12-31T23:59:59Z"])
+def test_a_marker_seen_when_ros_has_no_time_is_refused_and_the_tree_goes_on(bridge: Bridge, stamp: str) -> None:
+    assert isinstance(bridge.node, SimulatedNode)
+    result = json.dumps({**RESULT, "stamp": stamp}).encode()
+    with pytest.raises(BadMessage, match="1970 to 2106"):
+        list(bridge.handle(Message("camera/ip1/marker/582", result, received=NOW, retain=True), NOW))
+    list(bridge.tick(NOW))
+    assert "/tf_static" in [topic for topic, _ in bridge.node.published]
+
+
+def test_what_waits_for_its_time_can_be_said_then(bridge: Bridge) -> None:
+    rule = {"direction": "to_ros", "mqtt": "lab/temp", "ros": "/lab/temp", "type": "std_msgs/Float64", "rate": 2,
+            "fields": {"data": "{payload}"}}  # fmt: skip
+    port = Strict(
+        node.Ports((node.Outlet("/lab/temp", "std_msgs/Float64"), *bridge.node.ports.outlets)), lambda _: None
+    )
+    slow = Bridge(Home(items={}), (Rule.model_validate(rule),), port)
+
+    def hears(text: bytes) -> None:
+        assert not list(slow.handle(Message("lab/temp", text, received=NOW), NOW))
+
+    hears(b"1")
+    with pytest.raises(BadMessage, match=r"lab/temp to /lab/temp: data: expected float64, got 'warm'"):
+        hears(b"warm")
+    hears(b"2")
+    list(slow.tick(NOW + 1))
+    assert [fields for topic, fields in port.published if topic == "/lab/temp"] == [{"data": "1"}, {"data": "2"}]
 
 
 def test_a_call_of_any_service_is_taken_or_refused_and_answered(bridge: Bridge) -> None:
