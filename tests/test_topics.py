@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from services import topics
 from services.bus import Message, topic_matches
 from services.errors import BadMessage
-from services.payloads import Diagnostic, Order, PositionSet
+from services.payloads import Diagnostic, Order, PositionSet, stamp
 from services.topic import LEVELS, STALE_AFTER_S, Kind, Topic
 from services.topics import BLOB_LIMIT, TABLE, TEXT_LIMIT, find, page, read
 
@@ -213,6 +213,21 @@ def test_a_payload_that_is_not_what_the_table_says_is_refused(topic: str, payloa
         read(message(topic, payload), NOW)
     assert str(caught.value).startswith(topic + ": ")
     assert len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"covariance": []}, {"covariance": [[1e-4]]}, {"covariance": [[0, 0, 0], [0, 0, 0], [0, 0]]},
+     {"covariance": [[0] * 4] * 4}, {"stamp": "0001-01-01T00:00:00+01:00"}, {"first_seen": "2026-01-31T07:05:00"},
+     {"stamp": "9999-12-31T23:59:59.9999-01:00"}, {"stamp": "9999-12-31T23:59:59.999999Z"}],
+    ids=str,
+)  # fmt: skip
+def test_a_result_has_a_covariance_of_three_axes_and_a_time_that_can_be_told(change: dict[str, object]) -> None:
+    result = {"camera": "ip1", "marker": 582, "dictionary": "d", "place": "", "position": None, "scan": "s",
+              "stamp": stamp(NOW), "first_seen": stamp(NOW), "covariance": [[0, 0, 0]] * 3}  # fmt: skip
+    assert read(message("camera/ip1/scan/result", json.dumps(result).encode()), NOW)
+    with pytest.raises(BadMessage, match=f"{next(iter(change))}"):
+        read(message("camera/ip1/scan/result", json.dumps({**result, **change}).encode()), NOW)
 
 
 def test_the_message_says_where_what_was_expected_and_what_came() -> None:

@@ -23,6 +23,7 @@ from services.section import Section
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1  # as in nav_msgs/OccupancyGrid
 PIXELS = {FREE: 254, OCCUPIED: 0, UNKNOWN: 205}  # as map_saver writes them
 LAP_M = 0.8  # of the furniture that something lies on, on the way to the one who looks
+FAR = 10**9  # cells; the square of what is farther fits no integer of numpy
 XY = tuple[float, float]
 Cells = NDArray[np.int8]
 
@@ -79,7 +80,7 @@ class Grid:
         rows, columns = np.nonzero(open_)
         if not len(rows):
             return reached
-        row, column = self.cell(*start)
+        row, column = (max(-FAR, min(one, FAR)) for one in self.cell(*start))
         nearest = int(np.argmin((rows - row) ** 2 + (columns - column) ** 2))
         waiting = deque([(int(rows[nearest]), int(columns[nearest]))])
         reached[waiting[0]] = True

@@ -25,10 +25,11 @@ def stamp(seconds: float) -> str:
 
 
 def seconds(text: str) -> float:
-    """The reverse of `stamp`; any ISO 8601 text with an offset. ValueError when it is not one."""
+    """The reverse of `stamp`; any ISO 8601 text with an offset. ValueError when it is not one, or none for `stamp`."""
     when = datetime.fromisoformat(text)
     if when.tzinfo is None:
         raise ValueError(f"expected a time with an offset, such as Z, got {text!r}")
+    stamp(when.timestamp())  # the first and the last hours of all years are those of others in UTC
     return when.timestamp()
 
 
@@ -48,6 +49,10 @@ Free = Annotated[
 
 
 Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]  # a quantity; what comes back in an answer is `Free`
+
+
+Three = Field(min_length=3, max_length=3)
+Axis = Annotated[list[Real], Three]  # one line of a covariance
 
 
 class Payload(BaseModel):
@@ -220,7 +225,7 @@ class ScanResult(Payload):
     place: str
     position: Point | None
     why: str | None = None
-    covariance: list[list[Real]] | None = None
+    covariance: Annotated[list[Axis], Three] | None = None  # x, y, z
     orientation: Quaternion | None = None
     orientations: list[WeightedQuaternion] = []
     frame: str = "apartment"

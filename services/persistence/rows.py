@@ -105,8 +105,8 @@ def _sighting(known: Read, _time: int) -> Sighting:
 
 
 def _deviations(covariance: Sequence[Sequence[float]] | None) -> tuple[float | None, float | None, float | None]:
-    """Standard deviations of x, y, z in metres, the roots of the diagonal; None where it is not a 3 x 3 covariance."""
-    if covariance is None or len(covariance) != 3 or any(len(line) != 3 for line in covariance):
+    """Standard deviations of x, y, z in metres, the roots of the diagonal."""
+    if covariance is None:
         return None, None, None
     diagonal = [covariance[axis][axis] for axis in range(3)]
     sx, sy, sz = (math.sqrt(value) if value >= 0 else None for value in diagonal)

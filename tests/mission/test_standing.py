@@ -138,6 +138,14 @@ def test_a_wall_between_two_rooms_keeps_the_robot_in_its_own() -> None:
     assert len(stands(grid, robot, (2.0, -0.5))) == 4
 
 
+@pytest.mark.parametrize("far", [1e5, 1e10, 1e20, 1e300])
+def test_a_robot_that_says_it_is_on_the_moon_is_at_the_nearest_edge_of_its_map(far: float) -> None:
+    grid = room([(0.0, 2.9, 6.0, 0.2)])
+    for y, side in ((far, 3.0), (-far, 0.0)):
+        reach = body(grid, RADIUS, (2.0, y)).reach
+        assert (reach[grid.cell(2.0, side)], reach[grid.cell(2.0, 3.0 - side)]) == (True, False)
+
+
 def test_a_marker_is_seen_over_the_table_that_it_lies_on_and_not_through_a_wall() -> None:
     grid = room([(3.0, 3.0, 0.6, 0.6), (1.0, 0.5, 0.1, 4.0)])
     assert grid.sees((2.3, 0.0), (2.3, 1.3))
