@@ -9,8 +9,9 @@ import re
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
+from typing import Annotated
 
-from pydantic import BaseModel
+from pydantic import AfterValidator, BaseModel
 
 from services.bus import Message
 from services.errors import BadMessage
@@ -51,6 +52,15 @@ LEVELS = {
     "trait": "|".join(map(re.escape, CHOICES["trait"])),
     "component": r"[A-Za-z0-9_-]+(?:/[A-Za-z0-9_-]+)*",
 }
+
+
+def _robot(name: str) -> str:
+    if not re.fullmatch(LEVELS["robot"], name):
+        raise ValueError(f"expected a name of a-z, 0-9 and _ beginning with a letter, got {name!r}")
+    return name
+
+
+RobotName = Annotated[str, AfterValidator(_robot)]  # as it stands in a configuration
 
 
 @dataclass(frozen=True)

@@ -98,6 +98,23 @@ def test_a_camera_whose_name_cannot_be_a_topic_is_a_fault(folder: Path) -> None:
     assert f"{file}:{line}: simulators.cameras.Hall-1: expected a name of a-z" in faults(file)[0]
 
 
+@pytest.mark.parametrize(
+    ("there", "misnamed", "path"),
+    [
+        ("mission:\n  robots:\n    tiago:", "mission:\n  robots:\n    TIAGo:", "mission.robots.TIAGo"),
+        ("    tiago:\n      kind: tiago", "    TIAGo:\n      kind: tiago", "bridge.robots.TIAGo"),
+        ("  robot: tiago      ", "  robot: TIAGo      ", "bridge.robot"),
+        ("    robot: tiago", "    robot: TIAGo", "simulators.robot.robot"),
+    ],
+)
+def test_a_robot_whose_name_cannot_be_a_topic_is_a_fault(folder: Path, there: str, misnamed: str, path: str) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, there, misnamed, first=True) + misnamed[: misnamed.index("TIAGo")].count("\n")
+    assert faults(file) == [
+        f"{file}:{line}: {path}: expected a name of a-z, 0-9 and _ beginning with a letter, got 'TIAGo'"
+    ]
+
+
 def test_a_machine_that_runs_one_service_needs_that_services_secrets_only(folder: Path) -> None:
     file = folder / "simulated.yaml"
     spoil(file, "simulators:\n", "simulators:\n  cameras:\n    hall: {password: '${NOT_HERE}'}\n")

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from services.mission.state import Rules
 from services.section import Section
+from services.topic import RobotName
 
 
 class RobotSettings(Section):
@@ -22,7 +23,7 @@ class Config(Section):
     folder: Path = Path()
     state: Path | None = None  # where missions under way are kept; None: nowhere
     cameras: tuple[str, ...] = ()
-    robots: dict[str, RobotSettings]
+    robots: dict[RobotName, RobotSettings]
     sure: int = Field(default=2, ge=1, le=20)  # views of the marker by the robot that confirm it
     blank: int = Field(default=4, ge=1, le=50)  # pictures without it that end a look before its time
     look_s: float = Field(default=4.0, gt=0, le=60)  # at each stand

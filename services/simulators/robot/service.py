@@ -29,6 +29,7 @@ from services.simulators.robot.navigation import Navigation
 from services.simulators.robot.route import route
 from services.simulators.robot.sight import seen
 from services.simulators.world import World, load
+from services.topic import RobotName
 from services.topics import Read
 
 STEP_S = 0.1  # of its motion
@@ -41,7 +42,7 @@ class Config(Section):
 
     folder: Path = Path()
     world: Path
-    robot: str = "tiago"
+    robot: RobotName = "tiago"
     places: Path | None = None  # the file of its named points
     seed: int = 1
     fails: int = Field(default=0, ge=0)  # so many goals fail first, as when somebody stands in the way
