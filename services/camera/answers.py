@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from pydantic_core import from_json
-
 from services import topics
 from services.bus import Message
 from services.camera.orders import Command, canonical
 from services.errors import BadMessage
-from services.payloads import FINAL, LONGEST_ID, Order, OrderResult, OrderState, Position, Who
+from services.payloads import FINAL, Order, OrderResult, OrderState, Position, Who
+from services.payloads.gleaned import glean
 
 WHOSE = {"id", "by"}
 MOST_SAID = 200  # bytes of what made no sense
@@ -99,18 +98,7 @@ class Answers:
             value = wanted.value if isinstance(wanted, Order) else wanted.model_dump(exclude=WHOSE, exclude_none=True)
             refused = job(key, value, wanted.by, wanted.id, message)
         else:
-            by, order_id = _whose(message.payload)
-            refused = job(key, message.payload[:MOST_SAID].decode(errors="replace"), by, order_id, message)
+            found = glean(message.payload)
+            refused = job(key, message.payload[:MOST_SAID].decode(errors="replace"), found.by, found.id, message)
             why += f"; expected {self.ranges}" if row is topics.CAMERA_POSITION_SET else ""
         self.tell(refused, "refused", why)
-
-
-def _whose(payload: bytes) -> tuple[Who, str | None]:
-    """Whose order it is, and its id, as far as that can be read in what makes no sense."""
-    try:
-        told = from_json(payload)
-    except ValueError:
-        told = None
-    by, order_id = (told.get("by"), told.get("id")) if isinstance(told, dict) else (None, None)
-    who: Who = by if by in ("mission", "scan") else "human"
-    return who, str(order_id)[:LONGEST_ID] if isinstance(order_id, str | int) else None

@@ -12,6 +12,7 @@ from math import inf
 
 from services import topics
 from services.bus import Message
+from services.errors import BadMessage
 from services.mission import telling
 from services.mission.chart import Chart
 from services.mission.events import (
@@ -41,6 +42,16 @@ HEALTH_EVERY_S = 1.0
 SILENT_S = 10.0  # a robot that has said nothing for so long is away
 ASKED_AGAIN = 3  # times that a goal is sent until the robot takes it
 MOST_WAITING = 20
+UNHEARD_S = 60.0  # that an order waits for a robot which does not say where it is
+
+
+@dataclass(frozen=True)
+class _Waits:
+    """An order whose turn comes later; when there is no mission, until then, and why it is over afterwards."""
+
+    order: MissionOrder
+    until: float
+    why: str
 
 
 @dataclass(frozen=True)
@@ -63,7 +74,8 @@ class Desk:
         self.kept = Kept(config.state, robot)
         book = self.kept.read()
         self.mission: Mission | None = book.mission
-        self.waiting: list[MissionOrder] = list(book.waiting)
+        left_s = config.resume_s
+        self.waiting = [_Waits(one, book.at + left_s, f"nobody was at it for {left_s:.0f} s") for one in book.waiting]
         self._left_at: float | None = book.at if book.mission else None
         self.pose: Pose | None = None
         self.heard = -inf  # when the robot said anything
@@ -81,28 +93,36 @@ class Desk:
             times.append(self._sent.at + self.config.answer_s)
         return min(times)
 
+    def knows(self, order_id: str | None) -> bool:
+        """Whether an order of that id runs or waits."""
+        known = [one.id for one in self._orders] + ([self.mission.id] if self.mission else [])
+        return order_id in known
+
+    @property
+    def _orders(self) -> list[MissionOrder]:
+        return [one.order for one in self.waiting]
+
     # What comes.
 
     def order(self, order: MissionOrder, now: float) -> Iterator[Message]:
-        """A marker to find, or an end to it."""
+        """A marker to find, or an end to it; BadMessage for an id that it knows, whose answer is that order's."""
         if order.cancel:
             yield from self._cancel(order, now)
             return
         named = order.model_copy(update={"id": order.id or uuid.uuid4().hex[:12]})
-        known = [one.id for one in self.waiting] + ([self.mission.id] if self.mission else [])
-        if named.id in known:
-            return
+        if self.knows(named.id):
+            raise BadMessage(f"{topics.MISSION_ORDER.name(robot=self.robot)}: {named.id!r} runs or waits already")
         if len(self.waiting) >= MOST_WAITING:
-            yield telling.refused(self.robot, named, f"{MOST_WAITING} orders wait already", now)
+            yield telling.refused(self.robot, named.id, named.find, f"{MOST_WAITING} orders wait already", now)
             return
-        self.waiting.append(named)
+        self.waiting.append(self._in_turn(named, now))
         self._keep(now)
         yield from self.tick(now)
 
     def _cancel(self, order: MissionOrder, now: float) -> Iterator[Message]:
-        for one in [one for one in self.waiting if order.id in (None, one.id)]:
+        for one in [one for one in self.waiting if order.id in (None, one.order.id)]:
             self.waiting.remove(one)
-            yield telling.withdrawn(self.robot, one, now)
+            yield telling.withdrawn(self.robot, one.order, "cancelled by order", now)
         if self.mission is not None and order.id in (None, self.mission.id):
             yield from self._happens(Cancel(), now)
         self._keep(now)
@@ -159,13 +179,15 @@ class Desk:
 
     def tick(self, now: float) -> Iterator[Message]:
         """What is due: a step's time is up, a goal is sent again, the next order's turn has come, health."""
+        if self.mission is None or self._left_at is not None:
+            yield from self._give_up(now)
         if self._left_at is not None and self.mission is not None:
             yield from self._take_up(self.mission, self._left_at, now)
         if self.mission is not None and now >= self.mission.deadline:
             yield from self._happens(TimeIsUp(), now)
         yield from self._remind(now)
         if self.mission is None and self.waiting and self.pose is not None:
-            order = self.waiting.pop(0)
+            order = self.waiting.pop(0).order
             assert order.find is not None
             assert order.id is not None
             self.mission = Mission(order.id, order.find, now, since=now)
@@ -174,6 +196,18 @@ class Desk:
         if now >= self._health_due:
             self._health_due = now + HEALTH_EVERY_S
             yield topics.DIAGNOSTICS.message(self._health(now), component=f"mission/{self.robot}")
+
+    def _in_turn(self, order: MissionOrder, now: float) -> _Waits:
+        return _Waits(order, now + UNHEARD_S, f"{self.robot} has not said where it is for {UNHEARD_S:.0f} s")
+
+    def _give_up(self, now: float) -> Iterator[Message]:
+        """Orders that have waited for too long: whoever gave them has not stayed."""
+        late = [one for one in self.waiting if now >= one.until]
+        for one in late:
+            self.waiting.remove(one)
+            yield telling.withdrawn(self.robot, one.order, one.why, now)
+        if late:
+            self._keep(now)
 
     def _take_up(self, mission: Mission, left_at: float, now: float) -> Iterator[Message]:
         """After a restart, when the robot and the cameras have been heard: go on, unless too much time has passed."""
@@ -213,6 +247,7 @@ class Desk:
         if self.mission.over:
             yield telling.ended(self.robot, self.mission, now)
             self.mission = self._sent = self._left_at = None
+            self.waiting = [self._in_turn(one.order, now) for one in self.waiting]
         if self.mission is None or self.mission.story != before.story or self.mission.goal != before.goal:
             self._keep(now)
             yield from self._say(now)
@@ -239,13 +274,13 @@ class Desk:
     def _say(self, now: float) -> Iterator[Message]:
         """The state, when it has changed."""
         since = self._said.since if self._said and self._said.state == "idle" else stamp(now)
-        state = telling.state(self.mission, self.waiting, since)
+        state = telling.state(self.mission, self._orders, since)
         if state != self._said:
             self._said = state
             yield topics.MISSION_STATE.message(state, robot=self.robot)
 
     def _keep(self, now: float) -> None:
-        self.kept.write(Book(self.mission, now, tuple(self.waiting)))
+        self.kept.write(Book(self.mission, now, tuple(self._orders)))
 
     def _health(self, now: float) -> Diagnostic:
         silent = now - self.heard > SILENT_S

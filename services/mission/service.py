@@ -9,14 +9,17 @@ from services import topics
 from services.apartment import robot_places
 from services.bus import Message
 from services.errors import BadMessage
+from services.mission import telling
 from services.mission.chart import Chart
 from services.mission.desk import Desk
 from services.mission.memory import Memory, by_camera
 from services.mission.refresh import Refresh
 from services.mission.settings import Config
+from services.payloads.gleaned import glean
 from services.payloads.robot import Where, WhereReply
 from services.runner import Post
 
+MARKERS = range(10_000)  # that there may be
 USABLE = ("online", "degraded")
 
 
@@ -60,12 +63,15 @@ class Missions:
         """For `service/mission/info`."""
         return {"missions": sum(desk.mission is not None for desk in self.desks.values())}
 
-    def handle(self, message: Message, now: float) -> Iterable[Message]:
+    def handle(self, message: Message, now: float) -> Iterator[Message]:
         """Takes one message; BadMessage when it is for a robot that is not configured."""
-        read = topics.read(message, now)
-        if "robot" in read.levels:
-            return self._of_robot(read, now)
-        return self._of_house(read, now)
+        try:
+            read = topics.read(message, now)
+            self._check_robot(read)
+        except BadMessage as error:
+            yield from self._refused(message, str(error), now)
+            raise
+        yield from self._of_robot(read, now) if "robot" in read.levels else self._of_house(read, now)
 
     def tick(self, now: float) -> Iterator[Message]:
         """What is due at every desk, and whose answer has waited for long enough."""
@@ -74,10 +80,24 @@ class Missions:
         for desk in self.desks.values():
             yield from desk.tick(now)
 
-    def _of_robot(self, read: topics.Read, now: float) -> Iterable[Message]:
-        desk = self.desks.get(read.levels["robot"])
-        if desk is None:
+    def _check_robot(self, read: topics.Read) -> None:
+        if "robot" in read.levels and read.levels["robot"] not in self.desks:
             raise BadMessage(f"{read.message.topic}: expected one of {', '.join(self.desks)}")
+
+    def _refused(self, message: Message, why: str, now: float) -> Iterator[Message]:
+        """An order that cannot be taken is answered, with its own id where one can be read.
+
+        Not a cancel, and not an id that is known: the answer would be taken for the end of the mission that it names.
+        """
+        row, levels = topics.find(message.topic)
+        desk, found = self.desks.get(levels.get("robot", "")), glean(message.payload)
+        if row is not topics.MISSION_ORDER or found.told.get("cancel") or (desk is not None and desk.knows(found.id)):
+            return
+        marker = found.told.get("find")
+        yield telling.refused(levels["robot"], found.id, marker if marker in MARKERS else None, why, now)
+
+    def _of_robot(self, read: topics.Read, now: float) -> Iterable[Message]:
+        desk = self.desks[read.levels["robot"]]
         if read.topic is topics.MISSION_ORDER:
             return desk.order(read.payload, now)
         if read.topic is topics.ROBOT_GOTO_RESULT:

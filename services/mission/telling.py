@@ -91,16 +91,18 @@ def ended(robot: str, mission: Mission, now: float) -> Message:
     return topics.MISSION_RESULT.message(result, robot=robot)
 
 
-def refused(robot: str, order: MissionOrder, reason: str, now: float) -> Message:
-    """An order that is not taken."""
-    return _without_a_mission(robot, order, "refused", reason, now)
+def refused(robot: str, order_id: str | None, marker: int | None, reason: str, now: float) -> Message:
+    """An order that is not taken; id and marker as far as they are known."""
+    return _without_a_mission(robot, order_id, marker, "refused", reason, now)
 
 
-def withdrawn(robot: str, order: MissionOrder, now: float) -> Message:
-    """An order that was taken back before its turn came."""
-    return _without_a_mission(robot, order, "cancelled", "cancelled by order", now)
+def withdrawn(robot: str, order: MissionOrder, reason: str, now: float) -> Message:
+    """An order that was taken back before its turn came, or whose turn did not come."""
+    return _without_a_mission(robot, order.id, order.find, "cancelled", reason, now)
 
 
-def _without_a_mission(robot: str, order: MissionOrder, end: End, reason: str, now: float) -> Message:
-    result = MissionResult(id=order.id or "", marker=order.find or 0, state=end, reason=reason, stamp=stamp(now))
+def _without_a_mission(
+    robot: str, order_id: str | None, marker: int | None, end: End, reason: str, now: float
+) -> Message:
+    result = MissionResult(id=order_id or "", marker=marker or 0, state=end, reason=reason, stamp=stamp(now))
     return topics.MISSION_RESULT.message(result, robot=robot)
