@@ -1,8 +1,8 @@
 """What the service needs of ROS: a node that publishes fields, posts what it hears, and answers calls.
 
 Kept by `ros.py` (rospy) and `simulated.py` (no ROS). What comes from ROS is posted as `/ros/<topic>` with the
-fields as value, a call of a service of ours as `/ros-call/<service>` with a `Call`; a change of the link to the
-master as `LINK`.
+fields as value, and `retain` when it was latched before we were there; a call of a service of ours as
+`/ros-call/<service>` with a `Call`; a change of the link to the master as `LINK`.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from typing import Any
 
 from services.bridge import arguments, definitions, messages, reach
 from services.bridge.doubled import doubled
+from services.bridge.latched import Latched
 from services.bridge.node import ANY, CALL_S, CALLED, FROM_ROS, LINK, Call, Inlet, Link, Outlet, Ports, Say, Server
 from services.bridge.outgoing import Outgoing
 from services.bridge.rules import Fields
@@ -60,6 +61,7 @@ class RosNode:
         self._outgoing = {outlet.topic: Outgoing(outlet.queue) for outlet in ports.outlets}
         self._post = post
         self._clock = SimulatedTime(self._rospy)
+        self._latched = Latched()
         self._opened = False
         self._stopping = threading.Event()
         self._registered_with: int | None = None
@@ -129,9 +131,11 @@ class RosNode:
             )
             return
         if not self._opened:
+            self._latched.look(self._master)
             self._open()
         self._clock.follow(self._master)
         register(self._master, ros_node.registrations(self._ports.parameters))
+        self._latched.registered(time.monotonic())
         self._registered_with = pid
         count, advice = self._link.registrations + 1, reach.advice(ros_node.uri(), self._master.uri)
         self._tell(Link(up=True, text=f"{self._master.uri} pid {pid}", registrations=count, advice=advice))
@@ -179,11 +183,12 @@ class RosNode:
         """On rospy's threads, one per publisher."""
         if doubled(message):
             return
+        old = self._latched.is_old(topic, message._connection_header, time.monotonic(), time.time())
         if isinstance(message, self._rospy.AnyMsg):
             message = definitions.decoded(message._buff, message._connection_header)
         if message is None:
             return
-        self._post(Message(FROM_ROS + topic, value=messages.fields_of(message)))
+        self._post(Message(FROM_ROS + topic, value=messages.fields_of(message), retain=old))
 
     def _called(self, server: Server, response: Any, request: Any) -> Any:
         """On a thread of rospy per call, which may wait."""

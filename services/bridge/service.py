@@ -84,7 +84,7 @@ class Bridge:
             name = message.topic.removeprefix(CALLED)
             return self._serving[name].called(name, message.value, now)
         elif isinstance(message.value, dict):
-            return self._from_ros(message.topic.removeprefix(FROM_ROS), message.value, now)
+            return self._from_ros(message.topic.removeprefix(FROM_ROS), message.value, now, kept=message.retain)
         return ()
 
     def tick(self, now: float) -> Iterator[Message]:
@@ -165,7 +165,7 @@ class Bridge:
             states.check_state(item.type, str(heard.payload))
         return item is not None
 
-    def _from_ros(self, topic: str, fields: Fields, now: float) -> list[Message]:
+    def _from_ros(self, topic: str, fields: Fields, now: float, *, kept: bool) -> list[Message]:
         try:
             wanted = [(rule, to_mqtt(rule, fields, now)) for rule in self._to_mqtt[topic]]
             for rule, _ in wanted:
@@ -174,6 +174,10 @@ class Bridge:
             for _, message in asked:
                 self._check_home(message)
             own = list(self._hearing[topic].heard_ros(topic, fields, now)) if topic in self._hearing else []
+            if kept and any(_moves(message) for message in (*own, *(message for _, message in asked))):
+                raise BadMessage(
+                    "expected a word that is said now, got one that was latched before the bridge was there"
+                )
         except BadMessage as error:
             self.counters["refused"] += 1
             text = f"{topic} {_short(fields)}: {error}"
@@ -229,6 +233,12 @@ def _known(topic: str) -> tuple[topics.Topic | None, dict[str, str]]:
         return topics.find(topic)
     except BadMessage:
         return None, {}
+
+
+def _moves(message: Message) -> bool:
+    """Whether it is a command that has something done, other than to take note of a state."""
+    row, _ = _known(message.topic)
+    return row is not None and row.kind is topics.Kind.COMMAND and row is not topics.HOME_SET
 
 
 def _short(fields: Fields) -> str:

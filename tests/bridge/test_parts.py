@@ -14,6 +14,7 @@ import pytest
 from services.bridge import Config, start
 from services.bridge.confirm import ANSWER_S
 from services.bridge.snapshots import ANSWER_S as PICTURE_S
+from services.bus import Message
 from services.errors import BadMessage
 from services.vision.frames import Mount, Transform, camera_in_apartment
 from tests.bridge.test_service import CONFIG, HOME, NOW, RESULT, Driven
@@ -223,6 +224,12 @@ def test_a_mission_is_ordered_followed_and_cancelled(bridge: Driven) -> None:
 def test_another_word_to_the_mission_is_refused(bridge: Driven, key: str, value: str) -> None:
     with pytest.raises(BadMessage, match="expected key find"):
         bridge.robot_says("/iot_mission", key, value)
+
+
+def test_a_mission_that_was_latched_before_the_bridge_was_there_is_refused(bridge: Driven) -> None:
+    word = Message("/ros/iot_mission", value={"key": "find", "value": "582"}, retain=True)
+    with pytest.raises(BadMessage, match="latched before the bridge was there"):
+        list(bridge.service.handle(word, NOW))
 
 
 def status(bridge: Driven, name: str, now: float) -> tuple[int, str]:

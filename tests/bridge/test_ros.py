@@ -111,6 +111,32 @@ def test_the_first_word_that_rospy_says_twice_is_done_once(
     assert [text for _, topic, text in bridge.said if topic == "home/Dimmer/command"] == commands
 
 
+@pytest.mark.parametrize(
+    ("name", "commands"),
+    [("robot", ["OFF"]), ("rostopic_7_1600000000000", ["OFF"]), ("rostopic_7_{soon}", ["ON", "OFF"])],
+)
+def test_a_word_that_is_latched_since_before_the_bridge_was_there_is_done_only_when_it_is_young(
+    name: str, commands: list[str], master: ros.Master, run_bridge: Run
+) -> None:
+    """`rostopic pub` without -1 says it again to every bridge that comes; a -1 may have come just before it."""
+    own = name.format(soon=f"{1000 * (time.time() + 4.0):.0f}")  # as young as that for nine seconds
+    word = ["rostopic", "pub", "/iot_command", KEY_VALUE, "{key: Lamp, value: 'ON'}", f"__name:={own}"]
+    latching = subprocess.Popen(word, env={**os.environ, **master.env}, stdout=subprocess.DEVNULL)
+    try:
+        wait_until(lambda: publishers(master, "/iot_command") == [f"/{own}"], "its publisher", PATIENCE_S)
+        bridge = run_bridge(master.env, LAMP)
+        if commands == ["OFF"]:
+            bridge.says("diagnostics/bridge", lambda text: "latched before the bridge was there" in text)
+        else:
+            bridge.says("home/Lamp/command", lambda text: text == "ON")
+        pub(master, "/iot_command", KEY_VALUE, "{key: Lamp, value: 'OFF'}")
+        bridge.says("home/Lamp/command", lambda text: text == "OFF")
+        assert [text for _, topic, text in bridge.said if topic == "home/Lamp/command"] == commands
+    finally:
+        latching.terminate()
+        latching.wait(PATIENCE_S)
+
+
 def test_our_log_is_still_ours_when_the_node_is_up(master: ros.Master, run_bridge: Run) -> None:
     bridge = run_bridge(master.env, LAMP)
     bridge.registers(1)

@@ -188,6 +188,27 @@ def test_a_refused_word_is_told_on_the_diagnostics(
     assert bridge.service.counters["refused"] == 1
 
 
+def latched(topic: str, key: str, value: str) -> Message:
+    return Message(f"/ros{topic}", value={"key": key, "value": value}, retain=True)
+
+
+@pytest.mark.parametrize("word", [("/iot_command", "Lamp", "ON"), ("/ip_camera_order", "Move", "Left")])
+def test_a_command_that_was_latched_before_the_bridge_was_there_is_refused(
+    bridge: Driven, word: tuple[str, str, str]
+) -> None:
+    with pytest.raises(BadMessage, match="latched before the bridge was there"):
+        list(bridge.service.handle(latched(*word), NOW))
+    assert bridge.own_health(NOW + 0.5)["level"] == 1
+
+
+def test_a_state_or_a_question_that_was_latched_is_taken(bridge: Driven) -> None:
+    bridge.hears("home/Lamp/state", "ON")
+    (told,) = bridge.service.handle(latched("/iot_set", "Door", "OPEN"), NOW)
+    assert (told.topic, told.payload) == ("home/Door/set", b"OPEN")
+    assert not list(bridge.service.handle(latched("/iot_command", "ROS_COMMAND", "REFRESH"), NOW))
+    assert bridge.service.counters["refused"] == 0
+
+
 def test_the_warning_passes(bridge: Driven) -> None:
     with pytest.raises(BadMessage):
         bridge.robot_says("/iot_command", "Door", "OPEN")
