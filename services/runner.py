@@ -66,6 +66,7 @@ class Runner:
         self._batch: list[Message] = []  # of this turn; kept while it cannot be completed
         self._handled = 0
         self._waiting_for = ""
+        self._tick_again = 0.0  # not sooner, after one that could not say something
         self._next_info = self._next_diagnostic = self._started
         self._warned = (-WARN_FOR_S, "")
         self._logged: tuple[int, int] = (0, 0)  # second, lines in it
@@ -77,7 +78,7 @@ class Runner:
         own = min(self._next_info, self._next_diagnostic)
         if self._waiting_for:
             return min(own, self.clock() + PAUSE_S)
-        return own if self.service.due is None else min(own, self.service.due)
+        return own if self.service.due is None else min(own, max(self.service.due, self._tick_again))
 
     def turn(self, wait_s: float | None = 0.0) -> bool:
         """One turn; waits up to `wait_s` for a message. True when there was something to do.
@@ -153,6 +154,7 @@ class Runner:
                 self._publish(said)
         except BadMessage as error:  # what it has taken cannot be said
             self._dropped("bad", str(error), now)
+            self._tick_again = now + PAUSE_S
         except DeviceError as error:
             self._dropped("device_errors", str(error), now)
 

@@ -117,6 +117,8 @@ def test_a_tick_that_cannot_say_something_is_counted_and_the_service_goes_on() -
     assert bench.runner.info().counters["bad"] == 1
     assert bench.unacknowledged() == []
     assert bench.runner.turn(), "its own answer"
+    bench.probe.due = bench.clock.now - 1.0
+    assert bench.runner.due == bench.clock.now + 0.2, "it is not tried again without a pause"
 
 
 def test_while_something_is_away_nothing_is_acknowledged_or_taken_and_then_all_is_done_once() -> None:
