@@ -16,7 +16,7 @@ from services.aside import Aside
 from services.bus import Bus, Message
 from services.errors import BadMessage, DeviceError, Unavailable
 from services.payloads import Diagnostic, ServiceInfo, stamp
-from services.topics import DIAGNOSTICS, SERVICE_INFO
+from services.topics import DIAGNOSTICS, SERVICE_INFO, brings_commands
 
 INFO_EVERY_S = 5.0
 DIAGNOSTIC_EVERY_S = 1.0  # facts of diagnostic_aggregator: stale after 5 s without one
@@ -70,7 +70,7 @@ class Runner:
         self._next_info = self._next_diagnostic = self._started
         self._warned = (-WARN_FOR_S, "")
         self._logged: tuple[int, int] = (0, 0)  # second, lines in it
-        bus.subscribe(service.subscribes)
+        bus.subscribe(service.subscribes, [one for one in service.subscribes if brings_commands(one)])
 
     @property
     def due(self) -> float:

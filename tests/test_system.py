@@ -32,6 +32,13 @@ from tests.trials import BUS_SERVICES
 
 pytestmark = [pytest.mark.mosquitto, pytest.mark.mariadb, pytest.mark.ros]
 TARGET = 582
+KEPT = (  # who takes commands, and one of them
+    ("camera-ip1", "camera/ip1/order/Flip", "ON"),
+    ("simulated-home", "home/Bedroom_Mode/command", "eco"),
+    ("history", "history/get", '{"id": "kept", "what": "last"}'),
+    ("mission", "mission/tiago/where", '{"id": "kept", "marker": 582}'),
+    ("bridge", "robot/tiago/goto", '{"id": "kept", "point": "Sofa"}'),
+)
 
 
 @pytest.fixture(scope="module")
@@ -169,6 +176,23 @@ def test_a_command_of_the_robot_is_carried_out_by_the_home(flat: Simulated, shel
     house.until(r"home/Kitchen_Light/state ON")
     shell.rostopic_pub("/iot_command", "diagnostic_msgs/KeyValue", '{key: "Kitchen_Light", value: "OFF"}')
     house.until(r"home/Kitchen_Light/command OFF\n(.|\n)*home/Kitchen_Light/state OFF")
+
+
+def test_a_command_that_is_said_to_be_kept_is_refused_and_counted_by_who_is_there(
+    flat: Simulated, shell: Shell, bus: Client
+) -> None:
+    bad = {service: trials.counters(bus, service, 0)["bad"] for service, _, _ in KEPT}
+    bus.forget()
+    for _, topic, payload in KEPT:
+        shell.mosquitto_pub("-r", "-t", topic, "-m", payload)
+        shell.mosquitto_pub("-r", "-t", topic, "-n")  # taken away again: that is no command either
+    for service, topic, _ in KEPT:
+        assert trials.counters(bus, service, bad[service] + 2)["bad"] == bad[service] + 2, topic
+    answers = {m.topic for m in bus.seen if re.search("reply|result|Bedroom_Mode/state", m.topic)}
+    assert answers == {"camera/ip1/order_result"}
+    ends = [json.loads(m.payload) for m in bus.seen if m.topic == "camera/ip1/order_result"]
+    assert {(end["key"], end["state"]) for end in ends} == {("Flip", "refused")}
+    assert "retained" in ends[0]["error"]
 
 
 def test_a_scan_finds_the_marker_where_it_really_is_and_everyone_learns_it(flat: Simulated, shell: Shell) -> None:

@@ -15,7 +15,7 @@ from services.bus import Message, topic_matches
 from services.errors import BadMessage
 from services.payloads import Diagnostic, Order, PositionSet, stamp
 from services.topic import LEVELS, STALE_AFTER_S, Kind, Topic
-from services.topics import BLOB_LIMIT, TABLE, TEXT_LIMIT, find, page, read
+from services.topics import BLOB_LIMIT, TABLE, TEXT_LIMIT, brings_commands, find, page, read
 
 NOW = 1_769_839_500.0
 ROWS = [pytest.param(row, id=row.pattern) for row in TABLE]
@@ -144,6 +144,12 @@ def test_a_retained_command_is_refused(row: Topic) -> None:
     topic = row.name(**dict.fromkeys(row.names, "a"))
     with pytest.raises(BadMessage, match="retained"):
         read(message(topic, WANTED.get(row.pattern, b'{"pan": 1}'), retain=True), NOW)
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_commands_alone_come_by_the_filters_of_commands_and_by_wider_ones(row: Topic) -> None:
+    one = row.filter_for(**dict.fromkeys(row.names, "a"))
+    assert [brings_commands(one), brings_commands("#")] == [row.kind is Kind.COMMAND, True]
 
 
 @pytest.mark.parametrize("row", COMMANDS)

@@ -72,8 +72,12 @@ class Bus(Protocol):
         """How many messages were not sent for want of a connection, or not taken for want of time."""
         ...
 
-    def subscribe(self, filters: Sequence[str]) -> None:
-        """Asks for everything that matches; restored after every reconnect. `/bus/lost` is the bus's own word."""
+    def subscribe(self, filters: Sequence[str], as_published: Sequence[str] = ()) -> None:
+        """Asks for everything that matches; restored after every reconnect. `/bus/lost` is the bus's own word.
+
+        `retain` marks what the broker had kept; what comes by the filters that are in `as_published` too has it as it
+        was said (MQTT 5).
+        """
 
     def publish(self, message: Message) -> None:
         """Sends without waiting, at the latest in the next `receive`."""

@@ -33,7 +33,8 @@ class Hub:
                 del self.retained[message.topic]
         for client in list(self.clients):
             if client.wants(message.topic):
-                client.take(message._replace(retain=False, token=None))
+                retain = message.retain and client.wants_as_published(message.topic)
+                client.take(message._replace(retain=retain, token=None))
 
     def down(self, *, forget: bool = False) -> None:
         """The broker goes away, every connection breaks. `forget`: it had no persistence, retained states go too."""
@@ -63,6 +64,7 @@ class MemoryBus:
         self._packet = 1
         self._will = will
         self._filters: list[str] = []
+        self._as_published: list[str] = []
         self._inbox: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._unacked: deque[Message] = deque()
         self._outbox = Outbox(self._send, birth)
@@ -110,6 +112,10 @@ class MemoryBus:
         """Whether this client gets a message of that topic now."""
         return (self.connected or self.durable) and any(topic_matches(wanted, topic) for wanted in self._filters)
 
+    def wants_as_published(self, topic: str) -> bool:
+        """Whether it hears what is said there with the retain flag of who says it."""
+        return any(topic_matches(wanted, topic) for wanted in self._as_published)
+
     def take(self, message: Message) -> None:
         """Puts a delivered message into the inbox."""
         packet, again = self._packet, False
@@ -124,8 +130,9 @@ class MemoryBus:
         if self.connected:
             self._inbox.put(taken)
 
-    def subscribe(self, filters: Sequence[str]) -> None:
+    def subscribe(self, filters: Sequence[str], as_published: Sequence[str] = ()) -> None:
         """See `Bus`."""
+        self._as_published.extend(as_published)
         self._filters.extend(filters)
         if self.connected:
             self._replay(filters)

@@ -52,6 +52,7 @@ class MqttBus:
         self._will = will
         self._clock = clock
         self._filters: tuple[str, ...] = ()
+        self._as_published: frozenset[str] = frozenset()  # of these filters
         self._inbox = Inbox(gathers=not address.inline)
         self._outbox = Outbox(self._send, birth)
         self._in_flight: dict[int, Message] = {}  # events that the broker has not acknowledged yet
@@ -88,11 +89,12 @@ class MqttBus:
 
     # -- what the service calls
 
-    def subscribe(self, filters: Sequence[str]) -> None:
+    def subscribe(self, filters: Sequence[str], as_published: Sequence[str] = ()) -> None:
         """See `Bus`."""
+        self._as_published |= frozenset(as_published)
         self._filters = (*self._filters, *filters)
         if (client := self._client) is not None:
-            client.ask_for(filters)
+            client.ask_for(filters, self._as_published)
             self._network.wake()
             self._tell_of_session()
 
@@ -269,7 +271,7 @@ class MqttBus:
         self._client = client  # before the filters are read: who subscribes meanwhile asks by himself
         self._acknowledged.clear()
         self.connections = client.number = self.connections + 1
-        client.ask_for(self._filters)
+        client.ask_for(self._filters, self._as_published)
         self._up = self.connections  # after they are asked for: what is said is said by who listens
         self._sessions.append(bool(flags.session_present))
         self._tell_of_session()

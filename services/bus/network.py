@@ -13,7 +13,7 @@ import ssl
 import struct
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from contextlib import suppress
 from typing import Any
 
@@ -21,6 +21,7 @@ import paho.mqtt.client as paho
 from paho.mqtt.enums import MessageType, MQTTErrorCode, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import MalformedPacket, Properties  # type: ignore[attr-defined]
+from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from services.bus import Delivery, Message
 
@@ -53,11 +54,16 @@ class Client(paho.Client):
         self._asked: deque[None] = deque()  # one for each subscription that the broker has not granted yet
         self.on_socket_register_write = _nobody  # so that paho leaves the writing to `write`
 
-    def ask_for(self, filters: Iterable[str]) -> None:
-        """Subscribes, with QoS 1; not to the topics that are only within this process."""
-        if wanted := [(one, 1) for one in filters if not one.startswith("/")]:
-            self._asked.append(None)
-            self.subscribe(wanted)
+    def ask_for(self, filters: Iterable[str], as_published: Container[str] = ()) -> None:
+        """Subscribes, with QoS 1; not to the topics that are only within this process. MQTT 3.1.1 has no options."""
+        wanted = [one for one in filters if not one.startswith("/")]
+        if not wanted:
+            return
+        self._asked.append(None)
+        if self._protocol == MQTTProtocolVersion.MQTTv5:
+            self.subscribe([(one, SubscribeOptions(1, retainAsPublished=one in as_published)) for one in wanted])
+        else:
+            self.subscribe([(one, 1) for one in wanted])
 
     @property
     def listens(self) -> bool:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel, ValidationError
 
 from services import payloads as p
-from services.bus import Message
+from services.bus import Message, topic_matches
 from services.errors import BadMessage
 from services.topic import Kind as Kind
 from services.topic import Topic as Topic
@@ -48,6 +48,12 @@ def find(topic: str) -> tuple[Topic, dict[str, str]]:
         if match := row.regex.fullmatch(topic):
             return row, match.groupdict()
     raise BadMessage(f"no topic like {topic[:200]!r}")
+
+
+def brings_commands(topic_filter: str) -> bool:
+    """Whether commands of the table can come by this MQTT filter."""
+    commands = [row.filter for row in TABLE if row.kind is Kind.COMMAND]
+    return any(topic_matches(topic_filter, one) or topic_matches(one, topic_filter) for one in commands)
 
 
 class LateCommand(BadMessage):

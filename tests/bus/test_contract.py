@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ class Kit:
     """What a test does with a bus: make clients, take the broker away and bring it back."""
 
     keeps_retained = True
-    protocol = 5
+    tells_as_published = True  # needs MQTT 5
 
     def __init__(self) -> None:
         self.buses: list[Any] = []
@@ -105,7 +105,7 @@ def make_kit(kind: str, folder: Path) -> Kit:
         return MemoryKit()
     if kind == "embedded":
         made = BrokerKit(embedded.broker)
-        made.keeps_retained = False
+        made.keeps_retained = made.tells_as_published = False
         return made
     return BrokerKit(
         lambda port: mosquitto.private(folder, port=port, anonymous=True), inline=kind == "mosquitto-inline"
@@ -190,9 +190,9 @@ def test_who_listens_hears_the_very_next_word_however_long_the_broker_takes_to_g
     asks, speaker = Client.ask_for, kit.client("speaker")
     until(lambda: speaker.listens, speaker)
 
-    def ask_late(client: Client, filters: Iterable[str]) -> None:
+    def ask_late(client: Client, *filters: Any) -> None:
         threading.Event().wait(0.1)
-        asks(client, filters)
+        asks(client, *filters)
 
     monkeypatch.setattr(Client, "ask_for", ask_late)
     for turn in range(5):
@@ -222,6 +222,25 @@ def test_who_comes_later_gets_the_retained_state_marked_as_such(kit: Kit) -> Non
     witness.subscribe(["reply/#"])
     first = take(witness, 1, speaker)[0]
     assert (first.topic, first.payload, first.retain) == ("reply/s", b"2", True)
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_who_asks_for_it_is_told_whether_a_word_was_said_to_be_kept(kit: Kit, late: bool) -> None:
+    if not kit.tells_as_published:
+        pytest.skip("the embedded broker speaks MQTT 3.1.1")
+    speaker, listener = kit.client("speaker"), kit.make("listener")
+    kit.buses.append(listener)
+    until(lambda: listener.connected or not late, listener)  # asked for with the connection, or later
+    listener.subscribe(["reply/+/do", "reply/+/is"], ["reply/+/do"])
+    listen(listener)
+    for topic in ("reply/1/do", "reply/1/is"):
+        speaker.publish(Message(topic, b"kept", retain=True))
+        speaker.publish(Message(topic, b"said"))
+    told = {(m.topic, m.payload): m.retain for m in take(listener, 4, speaker)}
+    assert told == {
+        ("reply/1/do", b"kept"): True, ("reply/1/do", b"said"): False,
+        ("reply/1/is", b"kept"): False, ("reply/1/is", b"said"): False,
+    }  # fmt: skip
 
 
 def test_many_that_come_at_once_are_all_heard_and_hear(kit: Kit) -> None:
