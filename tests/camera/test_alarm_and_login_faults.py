@@ -70,11 +70,22 @@ def test_a_fault_shows_in_the_status_and_in_the_alarm_and_heals_without_a_restar
     here.until(lambda: state(here) == "online" and motion(here) == 0, WELL_S)
 
 
+@pytest.mark.parametrize("switches", [{}, {"nonce": "flaky", "stale": False}], ids=["reusable", "flaky"])
 def test_after_a_password_change_three_logins_fail_at_most_over_everything_together(
-    tmp_path: Path, camera: simulated.Simulated
+    tmp_path: Path, switches: dict[str, object]
 ) -> None:
-    with bench(tmp_path, camera, motion={"heartbeat_s": 1}) as here:
+    """Also when old nonces are refused as if the password were wrong, just before."""
+    with (
+        simulator(latency_s=0.02, switches=switches) as camera,
+        bench(tmp_path, camera, motion={"heartbeat_s": 1}) as here,
+    ):
         here.until(lambda: here.service.motion.fact == "attached", 10)
+        refused = door(here)["stale"]
+        for number in range(200 if switches else 0):
+            here.order("Flip", "True", str(number))
+            assert here.end_of(str(number), 10)["state"] == "done"
+            if door(here)["stale"] > refused:
+                break
         here.inbox.put(snapshot())
         here.tell("fault", name="password")
         here.tell("drop")

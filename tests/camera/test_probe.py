@@ -157,6 +157,7 @@ def test_what_it_leaves_open_cannot_be_seen(profile: str, meeting: Meeting) -> N
     true = PROFILES[profile]
     allowed = set(UNSEEN)
     allowed |= NO_DIGEST if true.auth == "basic" else set()
+    allowed |= {"stale"} if true.nonce == "reusable" else set()
     allowed |= {"move_status"} if true.status_form == "c" else set()
     allowed |= {"unset_preset"} if true.preset_max <= 9 else set()  # all are stored
     allowed |= set() if true.position_abs == "full" else {"position_abs_tilt_off"}

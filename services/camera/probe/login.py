@@ -8,7 +8,7 @@ from typing import Any
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import ODD_S, Exchange, Wire
 from services.camera.requests import Refused
-from services.camera.web.digest import Challenge, read_challenge
+from services.camera.web.digest import Challenge, read_challenge, says_stale
 
 TARGET = "/cgi-bin/magicBox.cgi?action=getDeviceType"
 USES = 16  # of nonces that were used before: a flaky firmware refuses about every other one
@@ -63,18 +63,22 @@ def nonces(wire: Wire, found: Findings) -> None:
         found.unknown["nonce"] = "it takes Basic only, which has no nonces"
         return
     passed = refused = 0
+    stale = False
     challenge = _fresh(wire)
     while passed + refused < USES and (passed or refused < IN_VAIN):
         if challenge.count == 0:
             wire.proven = wire.signed(TARGET, challenge).status == 200 or wire.proven
-        elif wire.signed(TARGET, challenge).status == 200:
+        elif (answer := wire.signed(TARGET, challenge)).status == 200:
             passed += 1
         else:
             refused += 1
+            stale = stale or says_stale(answer.challenges)
             wire.pause(ODD_S if passed else 0.0)
             challenge = _fresh(wire)
     found.switches["nonce"] = "single-use" if not passed else "flaky" if refused > ODD_ONES else "reusable"
     wire.reuses, wire.challenge = found.switches["nonce"] == "reusable", None
+    if not wire.reuses:
+        found.switches["stale"] = stale
 
 
 def _fresh(wire: Wire) -> Challenge:

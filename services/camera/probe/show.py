@@ -24,6 +24,7 @@ WORDS: dict[str, tuple[str, dict[object, str]]] = {  # switch -> what it is, and
     "nonce": ("A nonce", {"reusable": "may be used again: one request per command",
                           "single-use": "works once: two requests per command",
                           "flaky": "works again at times: about one and a half requests per command"}),
+    "stale": ("A refused nonce", {True: "is told apart from a wrong password", False: "looks like a wrong password"}),
     "challenge_spacing": ("Challenge", {"compact": "without spaces", "spaced": "with spaces"}),
     "digest_algorithms": ("Digest with", {}),
     "error_style": ("It says no by", {"200-error": "status 200 and the word Error", "400-body": "status 400",

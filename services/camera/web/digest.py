@@ -24,7 +24,10 @@ _FIELD = re.compile(r'(\w+)\s*=\s*(?:"([^"]*)"|([^\s,]+))')
 _STALE = re.compile(r"stale\s*=\s*\"?true", re.IGNORECASE)
 MOST_SENDS = 6  # of one request: bare, old nonce, new, new after a while, and a stale one or two between them
 VAIN, SELDOM = 4, 100  # old nonces refused in a row until they are no longer tried; then one in so many requests
+DOUBTED = 10  # so many requests go without an old nonce after one was refused and nothing said why
+RELIABLE = 20  # old nonces taken in a row, after which a refusal is hardly one of the nonce
 HASHES = {"md5": hashlib.md5, "sha-256": hashlib.sha256}
+Outcome = Literal["passed", "stale", "refused"]
 
 
 @dataclass
@@ -53,6 +56,11 @@ def read_challenge(headers: list[str]) -> Challenge | None:
             digests.append(_digest(values))
     digests.sort(key=lambda challenge: challenge.algorithm.lower() != "sha-256")
     return digests[0] if digests else basic
+
+
+def says_stale(headers: list[str]) -> bool:
+    """Whether it was the nonce that was refused, and the password is right."""
+    return any(_STALE.search(header) for header in headers)
 
 
 def _digest(values: dict[str, str]) -> Challenge:
@@ -107,18 +115,29 @@ class Nonces:
     """Whether this firmware takes a nonce more than once, learnt from what it does."""
 
     vain: int = 0  # uses of an old nonce in a row that were refused
+    taken: int = 0  # ... and that passed
+    doubted: int = 0  # requests that will go without one: what a new one meets tells whether the camera is at fault
     skipped: int = 0
 
     def worth_a_try(self) -> bool:
         """Whether to send an old nonce; seldom where that was always refused: firmware gets updates."""
+        if self.doubted:
+            self.doubted -= 1
+            return False
         if self.vain < VAIN:
             return True
         self.skipped = (self.skipped + 1) % SELDOM
         return self.skipped == 0
 
-    def used(self, *, passed: bool) -> None:
+    @property
+    def reliable(self) -> bool:
+        """Whether this firmware takes old nonces, as far as one can see."""
+        return self.taken >= RELIABLE
+
+    def used(self, outcome: Outcome) -> None:
         """An old nonce was sent."""
-        self.vain = 0 if passed else self.vain + 1
+        self.doubted = DOUBTED if outcome == "refused" and not self.reliable else 0
+        self.vain, self.taken = (0, self.taken + 1) if outcome == "passed" else (self.vain + 1, 0)
 
 
 class Login(httpx.Auth):
@@ -172,9 +191,9 @@ class Login(httpx.Auth):
                 if outcome == "passed":
                     login.passed()
                 elif outcome == "refused":
-                    login.failed(sure=refusals > 0)
+                    login.failed(sure=refusals > 0, odd=not old or self.nonces.reliable)
             if old:
-                self.nonces.used(passed=outcome == "passed")
+                self.nonces.used(outcome)
             if outcome == "passed":
                 return
             refusals += outcome == "refused" and not old
@@ -190,7 +209,7 @@ class Login(httpx.Auth):
         if self.challenge is not None and self.challenge.count > 0 and not self.nonces.worth_a_try():
             self.challenge = None
 
-    def _read(self, response: httpx.Response) -> Literal["passed", "stale", "refused"]:
+    def _read(self, response: httpx.Response) -> Outcome:
         """What an answer says of the login, and the challenge in it; Locked when it says that. Stale: another nonce."""
         if response.status_code != 401:
             return "passed"
@@ -203,7 +222,7 @@ class Login(httpx.Auth):
             return "passed"
         headers = response.headers.get_list("www-authenticate")
         self.challenge = read_challenge(headers)
-        return "stale" if any(_STALE.search(header) for header in headers) else "refused"
+        return "stale" if says_stale(headers) else "refused"
 
     def _sign(self, request: httpx.Request, challenge: Challenge) -> None:
         secret = self.password.get_secret_value()

@@ -177,7 +177,7 @@ class Door:
         self._used = {**dict(list(self._used.items())[1 - NONCES_KEPT :]), nonce: set()}
         parts = [f'realm="{self.realm}"', f'qop="{self.profile.qop}"', f'nonce="{nonce}"', f'opaque="{self.opaque}"']
         parts += [f"algorithm={algorithm}"] if algorithm != "MD5" else []
-        parts += ['stale="true"'] if stale else []
+        parts += ['stale="true"'] if stale and self.profile.stale else []
         return "Digest " + (", " if self.profile.challenge_spacing == "spaced" else ",").join(parts)
 
 

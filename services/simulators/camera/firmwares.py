@@ -114,13 +114,14 @@ PROFILES: dict[str, Profile] = {
         event_blank_lines=2,
         event_writes="gathered",
     ),
-    # Turns by shares of half a turn from where it is, and to no position.
+    # Turns by shares of half a turn from where it is, and to no position. An old nonce looks like a wrong password.
     "sd1a-2019": Profile(
         model="SD1A203T-GN",
         firmware="2.623.0000000.3.R",
         built="2019-11-27",
         version_form="one line",
         nonce="single-use",
+        stale=False,
         challenge_spacing="spaced",
         ptz_channels=(1,),
         error_style="400-body",

@@ -29,6 +29,7 @@ class Profile:
     qop: Literal["auth", "auth,auth-int"] = "auth"
     realm: Literal["serial", "mac", "hex"] = "serial"  # what it ends with
     nonce: Literal["reusable", "single-use", "flaky"] = "reusable"
+    stale: bool = True  # it says so when a nonce is refused
     challenge_spacing: Literal["compact", "spaced"] = "compact"  # after the challenge's commas
     header_case: Literal["mixed", "upper"] = "mixed"
     spurious_401: float = 0.0  # of the requests with a good login

@@ -73,6 +73,15 @@ def test_a_second_use_of_a_nonce_depends_on_the_firmware(nonce_life: str, passes
     assert passes or 'stale="true"' in again.challenges[0]
 
 
+def test_some_firmware_does_not_say_that_it_was_the_nonce() -> None:
+    door = _door(Profile(nonce="single-use", stale=False))
+    nonce = _nonce(door.judge("GET", TARGET, None, 0.0))
+    assert door.judge("GET", TARGET, _header(nonce, 1), 0.0).passed
+    again = door.judge("GET", TARGET, _header(nonce, 2), 0.0)
+    assert (again.passed, "stale" in again.challenges[0]) == (False, False)
+    assert (door.counters["stale"], door.counters["wrong"]) == (1, 0)
+
+
 def test_a_flaky_firmware_refuses_some_second_uses() -> None:
     door = _door(Profile(nonce="flaky"))
     nonce = _nonce(door.judge("GET", TARGET, None, 0.0))
