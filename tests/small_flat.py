@@ -161,11 +161,13 @@ def small_flat(
     *,
     simulator: Mapping[str, Any] | None = None,
     camera: Mapping[str, Any] | None = None,
+    firmware: Mapping[str, str] | None = None,
     networked: bool = False,
     with_ros: bool = False,
 ) -> Iterator[SmallFlat]:
     """Runs until the end of the block, everybody online. `simulator`, `camera`: settings of all cameras.
 
+    `firmware`: of a camera where it is not the usual one.
     `networked`: with a network between each camera and its service, to be cut. Missing: no mosquitto or ROS.
     """
     doors = {name: Door(f"http://127.0.0.1:{free_port()}") for name in cameras}
@@ -185,7 +187,8 @@ def small_flat(
                 name: {**_camera(name, near[name], folder), "rtsp_port": streams[name], **(camera or {})}
                 for name in doors},
             "simulators": {"cameras": {
-                name: {**_simulator(ports[name], door), "rtsp_port": streams[name], **(simulator or {})}
+                name: {**_simulator(ports[name], door), "rtsp_port": streams[name], **(simulator or {}),
+                       **({"profile": firmware[name]} if name in (firmware or {}) else {})}
                 for name, door in doors.items()}},
             **({"bridge": {"rules": "bridge.yaml"}} if with_ros else {}),
         }  # fmt: skip

@@ -55,10 +55,10 @@ def real(trial: Callable[[Simulated, random.Random], float]) -> Iterator[Turn]:
 
 @contextmanager
 def cameras(
-    trial: Callable[[SmallFlat, random.Random], float], names: tuple[str, ...] = ("ip1",), **options: Any
+    trial: Callable[[SmallFlat, random.Random], float], cameras: tuple[str, ...] = ("ip1",), **options: Any
 ) -> Iterator[Turn]:
     """Turns with simulated cameras and a broker alone, one apartment for all."""
-    with tempfile.TemporaryDirectory() as name, small_flat(Path(name), names, **options) as flat:
+    with tempfile.TemporaryDirectory() as name, small_flat(Path(name), cameras, **options) as flat:
         yield lambda rng: trial(flat, rng)
 
 
@@ -175,7 +175,10 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
         "x the time of an order",
     ),
     "camera-kills": (
-        lambda: cameras(lambda flat, rng: rng.choice(camera_trials.KILLS)(flat)),
+        lambda: cameras(
+            lambda flat, rng: rng.choice(camera_trials.KILLS)(flat, rng.choice(camera_trials.MOTIONS)),
+            **camera_trials.EVERY_MOTION,
+        ),
         20,
         "s until the motor stands still",
     ),

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from statistics import median
 from typing import Any
 
@@ -73,19 +75,44 @@ def newest(bus: Client, topic: str) -> bytes:
     return bytes(said[-1]) if said else b""
 
 
-def kill_service(flat: SmallFlat, *, camera: str = "ip1") -> float:
-    """kill -9 of the camera's service in the middle of a move; seconds until the motor stands still."""
-    door, service = flat.doors[camera], flat.pid(f"camera-{camera}")
-    with flat.client(f"service/camera-{camera}/status", f"camera/{camera}/#") as bus:
-        turn(bus, flat, camera)
-        os.kill(service, signal.SIGKILL)
-        seconds = until_still(door)
-        bus.until(lambda message: message.payload == b"offline", 10.0, "the last will")
+@dataclass(frozen=True)
+class Motion:
+    """What turns a camera; how many degrees it has turned in the middle of it; what the camera is asked for then."""
+
+    topic: str
+    payload: str
+    degrees: float
+    asked: str
+
+
+GOAL = '{"pan": 250, "tilt": 40}'  # the long way round: the dead arc is between
+MOVE = Motion("order/Move", "Left 2 20", 3.0, "action=start&channel=1&code=Left&")
+REGULATED = Motion("position/set", GOAL, 30.0, r"action=start&channel=1&code=(Left|Right)")  # start, look, stop
+DRIVEN = Motion("position/set", GOAL, 30.0, "action=moveAbsolutely&")  # the firmware does it
+MOVING: Mapping[str, Motion] = {"ip1": MOVE}
+TIMED_S = 4.0
+TIMED = Motion("order/Move", f"Left 2 {TIMED_S:.0f}", 3.0, "action=start&channel=1&code=Continuously&")
+EVERY_MOTION: dict[str, Any] = {"cameras": ("ip1", "driving"), "firmware": {"driving": "sd2a-2023"}}
+GOALS: Mapping[str, Motion] = {"ip1": REGULATED, "driving": DRIVEN}
+
+
+def kill_service(flat: SmallFlat, moving: Mapping[str, Motion] = MOVING) -> float:
+    """kill -9 of the cameras' services in the middle of their motions; seconds until every motor stands still."""
+    doors = [flat.doors[camera] for camera in moving]
+    services = [flat.pid(f"camera-{camera}") for camera in moving]
+    with flat.client("service/+/status", "camera/#") as bus:
+        turn(bus, flat, moving)
         bus.forget()
-        bus.payload(f"service/camera-{camera}/status", lambda text: text == "online", 20.0)
-        rests(door)
-        wait(bus, lambda: online(bus, camera), 5.0, "the new one to have met the camera")
-        takes_orders(bus, camera)
+        for service in services:
+            os.kill(service, signal.SIGKILL)
+        seconds = until_still(*doors)
+        for status in (f"service/camera-{camera}/status" for camera in moving):
+            bus.until(lambda said, of=status: said[:2] == (of, b"offline"), 10.0, "the last will")  # type: ignore[misc]
+            wait(bus, lambda status=status: newest(bus, status) == b"online", 20.0, "a new one")  # type: ignore[misc]
+        rests(*doors)
+        for camera in moving:
+            wait(bus, lambda camera=camera: online(bus, camera), 5.0, "the new one to have met the camera")  # type: ignore[misc]
+            takes_orders(bus, camera)
     return seconds
 
 
@@ -93,7 +120,7 @@ def end_service(flat: SmallFlat, *, camera: str = "ip1") -> float:
     """SIGTERM for the service in the middle of a move; seconds until the motor stands still. Its order has an end."""
     door, service = flat.doors[camera], flat.pid(f"camera-{camera}")
     with flat.client(f"service/camera-{camera}/status", f"camera/{camera}/#") as bus:
-        turn(bus, flat, camera)
+        turn(bus, flat, {camera: MOVING[camera]})
         os.kill(service, signal.SIGTERM)
         seconds = until_still(door)
         ended = bus.payload(f"camera/{camera}/order_result", lambda result: result.final, 10.0)
@@ -103,32 +130,33 @@ def end_service(flat: SmallFlat, *, camera: str = "ip1") -> float:
     return seconds
 
 
-def kill_supervisor(flat: SmallFlat, *, camera: str = "ip1") -> float:
-    """kill -9 of the supervisor in the middle of a move; seconds until the motor stands still. Nobody is left over."""
-    door, family = flat.doors[camera], flat.processes
+def kill_supervisor(flat: SmallFlat, moving: Mapping[str, Motion] = MOVING) -> float:
+    """kill -9 of the supervisor in the middle of motions; seconds until the motors stand still. Nobody is left over."""
+    doors, family = [flat.doors[camera] for camera in moving], flat.processes
     assert len(family) > 2, "the supervisor, a service and a watchdog"
-    with flat.client(f"camera/{camera}/#") as bus:
-        turn(bus, flat, camera)
+    with flat.client("camera/#") as bus:
+        turn(bus, flat, moving)
         os.kill(flat.process.pid, signal.SIGKILL)
-        seconds = until_still(door)
+        seconds = until_still(*doors)
         end_orphans(family)
-        rests(door)
+        rests(*doors)
     flat.start_services()
     return seconds
 
 
-def kill_broker(flat: SmallFlat, *, camera: str = "ip1") -> float:
-    """kill -9 of the broker in the middle of a move; seconds until the motor stands still. Then all is as before."""
-    door = flat.doors[camera]
-    with flat.client(f"camera/{camera}/#") as bus:
-        turn(bus, flat, camera)
+def kill_broker(flat: SmallFlat, moving: Mapping[str, Motion] = MOVING) -> float:
+    """kill -9 of the broker in the middle of motions; seconds until the motors stand still. Then all is as before."""
+    doors = [flat.doors[camera] for camera in moving]
+    with flat.client("camera/#") as bus:
+        turn(bus, flat, moving)
     with flat.without_broker(signal.SIGKILL):
-        seconds = until_still(door)
-        rests(door)
-    with flat.client(f"camera/{camera}/#", f"diagnostics/camera/{camera}") as bus:
-        speaks(bus, camera)
-        bus.payload(f"camera/{camera}/status", lambda status: status.state == "online", 20.0)
-        takes_orders(bus, camera)
+        seconds = until_still(*doors)
+        rests(*doors)
+    with flat.client("camera/#", "diagnostics/#") as bus:
+        for camera in moving:
+            speaks(bus, camera)
+            bus.payload(f"camera/{camera}/status", lambda status: status.state == "online", 20.0)
+            takes_orders(bus, camera)
     return seconds
 
 
@@ -139,28 +167,66 @@ def cut_network(flat: SmallFlat, *, camera: str = "ip1", seconds: float = 0.0) -
     """
     door, net = flat.doors[camera], flat.networks[camera]
     with flat.client(f"camera/{camera}/#") as bus:
-        turn(bus, flat, camera, "Left 2 6")
-        try:
-            net.cut()
-            bus.payload(f"camera/{camera}/status", lambda status: status.state == "degraded", NOTICED_S)
-            bus.collect(seconds)
-            bus.forget()
+        turn(bus, flat, {camera: replace(MOVE, payload="Left 2 6")})
+        with without_network(flat, bus, camera):
+            stays_degraded(bus, camera, seconds)
             assert door.moving, "a camera without a network turns on"
             met = len(door.log())
-        finally:
-            net.mend()
         back = time.time()
         peers.wait_until(lambda: len(door.log()) > met, "a request", 10.0)
         first = door.log()[met]
         until_still(door)
-        bus.payload(f"camera/{camera}/status", lambda status: status.state == "online", 15.0)
-        rests(door)
-        takes_orders(bus, camera)
+        well_again(bus, door, camera)
     assert "action=stop" in first["target"], f"the first request was {first['target']}"
     reached = float(first["time"]) - back
     knocked = [round(when - back, 3) for when in net.let_in if when > back]
     assert reached < REACHED_S, f"{reached:.3f} s after the return; connections were let in at {knocked}"
     return reached
+
+
+def cut_timed_move(flat: SmallFlat, *, camera: str = "driving") -> float:
+    """The network goes in the middle of a move that the firmware times, and nothing gets there until that has ended.
+
+    Seconds from the cut until the motor stands still.
+    """
+    door = flat.doors[camera]
+    with flat.client(f"camera/{camera}/#") as bus:
+        turn(bus, flat, {camera: TIMED})
+        with without_network(flat, bus, camera):
+            met = len(door.log())
+            seconds = until_still(door)
+            stays_degraded(bus, camera, 4.0)
+            rests(door)
+            assert door.log()[met:] == []
+        well_again(bus, door, camera)
+    return seconds
+
+
+@contextmanager
+def without_network(flat: SmallFlat, bus: Client, camera: str) -> Iterator[None]:
+    """The network between a camera and its service is cut until the end of the block."""
+    bus.forget()
+    flat.networks[camera].cut()
+    try:
+        yield
+    finally:
+        flat.networks[camera].mend()
+
+
+def stays_degraded(bus: Client, camera: str, seconds: float) -> None:
+    """The status tells of the lost camera in time, and says nothing else for so many seconds then."""
+    bus.payload(f"camera/{camera}/status", lambda status: status.state == "degraded", NOTICED_S)
+    bus.collect(seconds)
+    said = [json.loads(message.payload)["state"] for message in bus.seen if message.topic == f"camera/{camera}/status"]
+    assert set(said[said.index("degraded") :]) == {"degraded"}, said
+    bus.forget()
+
+
+def well_again(bus: Client, door: Door, camera: str) -> None:
+    """The camera is online, nothing turns, and it takes orders."""
+    bus.payload(f"camera/{camera}/status", lambda status: status.state == "online", 15.0)
+    rests(door)
+    takes_orders(bus, camera)
 
 
 def speaks(bus: Client, camera: str) -> None:
@@ -175,28 +241,41 @@ def takes_orders(bus: Client, camera: str) -> None:
     assert result.state == "done", result
 
 
-def turn(bus: Client, flat: SmallFlat, camera: str, move: str = "Left 2 20") -> None:
-    """Lets a camera turn by an order, and waits until it has turned for some degrees."""
-    door = flat.doors[camera]
-    door.tell("pose", pan=90.0, tilt=20.0)
-    bus.payload(f"camera/{camera}/position", lambda position: abs(position.pan - 90.0) < 1, 5.0)
-    bus.say(f"camera/{camera}/order/Move", move)
-    peers.wait_until(lambda: apart(door.state()["pose"]["pan"], 90.0) > 3 and door.moving, "the camera to turn", 10.0)
+def turn(bus: Client, flat: SmallFlat, moving: Mapping[str, Motion]) -> None:
+    """Lets cameras turn, one after the other, the last ones quickest; then each is in the middle of its motion."""
+    met = {}
+    for camera in moving:
+        flat.doors[camera].tell("pose", pan=90.0, tilt=20.0)
+    for camera in moving:
+        bus.payload(f"camera/{camera}/position", lambda position: abs(position.pan - 90.0) < 1, 5.0)
+        met[camera] = len(flat.doors[camera].log())
+    for camera, motion in moving.items():
+        bus.say(f"camera/{camera}/{motion.topic}", motion.payload)
+        peers.wait_until(lambda one=(flat.doors[camera], motion): midway(*one), f"{camera} to turn", 10.0)  # type: ignore[misc]
+        asked = [entry["target"] for entry in flat.doors[camera].log()[met[camera] :]]
+        assert any(re.search(motion.asked, target) for target in asked), asked
+    assert all(flat.doors[camera].moving for camera in moving)
 
 
-def until_still(door: Door) -> float:
-    """Seconds until the motor stands still."""
+def midway(door: Door, motion: Motion) -> bool:
+    """Whether a camera is in the middle of it."""
+    state = door.state()
+    return apart(state["pose"]["pan"], 90.0) > motion.degrees and bool(state["moving"])
+
+
+def until_still(*doors: Door) -> float:
+    """Seconds until every motor stands still."""
     began = time.monotonic()
-    peers.wait_until(lambda: not door.moving, "the motor to stand still", 10.0)
+    peers.wait_until(lambda: not any(door.moving for door in doors), "the motors to stand still", 10.0)
     return time.monotonic() - began
 
 
-def rests(door: Door) -> None:
+def rests(*doors: Door) -> None:
     """Nothing moves for a second: nobody starts anything."""
-    pose, end = door.state()["pose"], time.monotonic() + 1.0
+    poses, end = [door.state()["pose"] for door in doors], time.monotonic() + 1.0
     while time.monotonic() < end:
-        assert not door.moving
-    assert door.state()["pose"] == pose
+        assert not any(door.moving for door in doors)
+    assert [door.state()["pose"] for door in doors] == poses
 
 
 def apart(one: float, other: float) -> float:
@@ -205,6 +284,7 @@ def apart(one: float, other: float) -> float:
 
 
 KILLS = (kill_service, kill_supervisor, kill_broker)
+MOTIONS = (MOVING, GOALS)
 
 
 @dataclass(frozen=True)
@@ -371,8 +451,9 @@ def well(flat: SmallFlat, bus: Client, camera: str, limit_s: float) -> None:
 def change_password(flat: SmallFlat, *, camera: str = "ip1") -> float:
     """Somebody changes the password, and later changes it back. Logins that failed until then, over all connections."""
     door = flat.doors[camera]
-    with flat.client(f"camera/{camera}/#") as bus:
+    with flat.client(f"camera/{camera}/#", f"diagnostics/camera/{camera}") as bus:
         bus.payload(f"camera/{camera}/motion", lambda motion: motion.value != -1, 20.0)
+        wait(bus, lambda: met(bus), 20.0, "everybody to have logged in, the watchdog too")
         before = failed(door)
         door.tell("fault", name="password")
         door.tell("drop")  # the endless answers have to log in anew
