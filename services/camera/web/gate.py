@@ -20,7 +20,7 @@ from services.camera.requests import Away, BadLogin, Locked
 from services.errors import DeviceError
 
 MOST_FAILURES = 3
-MOST_ODD, MOST_OFTEN, ODD_WINDOW_S = 4, 7, 10.0
+MOST_ODD, ODD_WINDOW_S = 7, 10.0
 PATIENT_S = 2.0  # so long a request waits for a camera that refuses at random, before it gives up
 RETRY_S, LONGEST_RETRY_S = 120.0, 1800.0  # a lock lasts about 30 minutes
 ODD_S = 0.5  # an odd refusal of a valid login is over after so long
@@ -33,10 +33,9 @@ class Book:
     """What the gate knows, without clock and threads; times are seconds of any one clock.
 
     A camera that has just refused a login and then taken it (`ODD_WINDOW_S`) refuses at random: there three failures
-    prove less, so another try follows before it counts as a wrong password, and a few at growing distances where it
-    did so again within that time: it would be shut out for most of the time. A nonce that is too old for the camera is
-    no such refusal. Where a login has passed, two refusals prove nothing: by chance alone they would shut everybody out
-    every few hours.
+    prove less, so a few single tries follow at growing distances before it counts as a wrong password. A nonce that is
+    too old for the camera is no such refusal. Where a login has passed, two refusals prove nothing: by chance alone they
+    would shut everybody out every few hours.
     """
 
     retry_s: float = RETRY_S
@@ -50,9 +49,8 @@ class Book:
     opens_at: float | None = None  # None: it is open
     closed_s: float = 0.0  # how long it was closed the last time
     good: bool = False  # this password was taken at some time
-    odd: int = 0  # of the failures in a row: refused by chance, if the password is right
+    odd: bool = False  # one of the failures in a row was by chance, if the password is right
     odd_until: float = float("-inf")
-    often_until: float = float("-inf")
 
     def closed(self, now: float) -> DeviceError | None:
         """Why nobody may try at this time; None: it is open."""
@@ -95,10 +93,8 @@ class Book:
         """A login was accepted; it says nothing about those that failed after it was sent."""
         if number == self.ever:
             if self.odd and self.why != "locked":
-                if now < self.odd_until or self.odd > 1:
-                    self.often_until = now + ODD_WINDOW_S
                 self.odd_until = now + ODD_WINDOW_S
-            self.odd, self.good = 0, True
+            self.odd, self.good = False, True
             self.failures, self.closings, self.why, self.opens_at = 0, 0, "", None
             self.unanswered = False
 
@@ -109,9 +105,9 @@ class Book:
         """
         self.failures += 1
         self.ever += 1
-        self.odd += odd
+        self.odd = self.odd or odd
         if now < self.odd_until and not self.closings:
-            if self.failures >= (MOST_OFTEN if now < self.often_until else MOST_ODD):
+            if self.failures >= MOST_ODD:
                 self.close(now, "wrong")
             elif self.failures >= MOST_FAILURES:
                 self._shut(now, 2.0 ** (self.failures - MOST_FAILURES), "odd")
