@@ -34,8 +34,8 @@ class Book:
 
     A camera that has just refused a login and then taken it (`ODD_WINDOW_S`) refuses at random: there three failures
     prove less, so a few single tries follow at growing distances before it counts as a wrong password. A nonce that is
-    too old for the camera is no such refusal. Where a login has passed, two refusals prove nothing: by chance alone they
-    would shut everybody out every few hours.
+    too old for the camera is no such refusal. Where a login has passed, two refusals prove nothing: by chance alone
+    they would shut everybody out every few hours.
     """
 
     retry_s: float = RETRY_S
