@@ -1,14 +1,15 @@
 """Whether the camera can be used, judged by its replies, and how long to leave it in peace. Pure.
 
-A lost camera is told once, and its return once.
+A lost camera is told once, and its return once; that it has restarted meanwhile, too.
 """
 
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+from services.camera.absence import Absence
 from services.camera.requests import Away, BadLogin, Locked, Reply, Status
 from services.payloads import CameraStatus
 
@@ -34,6 +35,8 @@ class Health:
     rebooting: bool = False
     stream: str = ""  # why no moving picture comes although it was ordered
     moving: bool = False  # a motion is to be stopped: losing the camera now is worse than offline
+    met: bool = False  # it was asked who it is since it was away
+    absence: Absence = field(default_factory=Absence)
 
     @property
     def online(self) -> bool:
@@ -63,22 +66,34 @@ class Health:
         elif isinstance(error, Away):
             state: State = "rebooting" if self.rebooting else "degraded" if self.moving else "offline"
             self._away(reply, state, str(error))
+            self.absence.take(reply)
             self.next_poll = reply.received + min(LONGEST_PAUSE_S, FIRST_PAUSE_S * 2 ** min(self.failures - 1, 10))
         elif not self.rebooting:
             self._there(reply)
 
     def reboot(self) -> None:
         """The camera was told to start again."""
-        self.rebooting = True
-        self.state, self.reason = "rebooting", "as ordered"
+        self.rebooting = self.absence.ordered = True
+        self.state, self.reason, self.met = "rebooting", "as ordered", False
 
     def rebooted(self, *, why_not: str = "") -> None:
         """It is up again, or nobody waits for it any longer."""
-        self.rebooting = False
+        self.rebooting, self.absence.ordered = False, not why_not
         self.state, self.reason = ("offline", why_not) if why_not else ("online", "")
 
+    def meet(self, who: Reply) -> bool:
+        """It was asked who it is: whether it has restarted since it was asked that the last time."""
+        self.met = self.online
+        if not self.met:
+            return False
+        signs, self.absence = self.absence.signs(who.result), Absence(known=True)
+        if signs:
+            level = logging.INFO if "as ordered" in signs else logging.WARNING
+            log.log(level, "%s: it has restarted, as it seems: %s", self.name, ", ".join(signs))
+        return bool(signs)
+
     def _away(self, reply: Reply, state: State, reason: str) -> None:
-        self.failures += 1
+        self.failures, self.met = self.failures + 1, False
         if self.state == "online":
             log.warning("%s: lost: %s", self.name, reason)
         elif self.failures == 1:

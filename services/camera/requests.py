@@ -11,7 +11,7 @@ The requests become a brand's own words in `brands/`; who may send them, and in 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import Literal, Protocol
 
@@ -37,7 +37,9 @@ class Locked(BadLogin):
 
 
 class Away(DeviceError):
-    """No answer in time, or one that makes no sense."""
+    """No answer in time, or one that makes no sense. `turned_away`: its address answers, and nobody serves there."""
+
+    turned_away = False
 
 
 class Rank(IntEnum):
@@ -245,11 +247,12 @@ class Picture:
 
 @dataclass(frozen=True)
 class Identity:
-    """Which camera this is."""
+    """Which camera this is. `remembers`: whether it knew our login after it had been away; None: nothing tells."""
 
     model: str
     serial: str
     version: str
+    remembers: bool | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)

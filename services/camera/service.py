@@ -40,7 +40,7 @@ from services.camera.upkeep import Upkeep
 from services.camera.video.channel import ASKED, Channel
 from services.camera.video.feed import Feed
 from services.errors import BadMessage
-from services.payloads import Order, OrderState, PositionSet, ScanResult
+from services.payloads import Order, OrderState, PositionSet, ScanResult, stamp
 
 BUSY_S = 0.5  # between two looks whether the motors are free again
 BROKER_LOST, ENDS = "the connection to the broker was lost", "the service ends"
@@ -192,11 +192,9 @@ class CameraService:
 
     def _poll(self, now: float) -> Plan[None]:
         """Asks where the camera looks while nobody else does, and who it is after it was away."""
-        met = False
         while True:
             now = yield from wait(max(now + 0.05, self.health.look_at(self.bulletin.still_for(now))))
             if self.motors.busy or self.health.rebooting:
-                met = met and not self.health.rebooting
                 now = yield from wait(now + BUSY_S)
                 continue
             if now < self.health.look_at(self.bulletin.still_for(now)):
@@ -204,16 +202,16 @@ class CameraService:
             reply = yield from attempt(Status())
             now = reply.received
             self.motors.see(reply, turning=self.bulletin.turning)
-            if self.health.online and not met:
+            if self.health.online and not self.health.met:
                 self.early.waits = True
-                yield from attempt(Identify())
+                if self.health.meet((yield from attempt(Identify()))):
+                    self.bulletin.facts.values["rebooted"] = stamp(now)
                 self.stage.begin(self.abilities.meet(self.bulletin.identity, now), now, _nobody)
                 now = (yield from attempt(GetPicture())).received
                 self.upkeep.met()
                 self.stage.begin(self.scanner.restored(), now, _nobody)
                 if self.bulletin.turning:
                     self.motors.make_sure(now)
-            met = self.health.online
             for job, command in self.early.met(now):
                 self._take(job, command, now)
 

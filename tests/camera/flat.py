@@ -52,6 +52,8 @@ class VirtualCamera:
         self.picture = Picture(True, motors.mirror, "color")
         self.away: DeviceError | None = None
         self.blind = False  # it gives no pictures
+        self.remembers: bool | None = None
+        self.met = 0  # how often it was asked who it is
         self.errands: list[Errand] = []
         self.answers: dict[type[Errand], Callable[[Any], object]] = {}
         self.waiting: list[tuple[Request, int]] = []
@@ -110,7 +112,8 @@ class VirtualCamera:
                 self.motors.mirror = self.picture.mirror
                 return self.picture, None
             case Identify():
-                return Identity("IP3M-941W", "AMC0000000000001", "2.420"), None
+                self.met += 1
+                return Identity("IP3M-941W", "AMC0000000000001", "2.420", self.remembers), None
             case Reboot():
                 return None, None
             case Errand():

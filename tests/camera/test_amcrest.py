@@ -32,6 +32,7 @@ from services.camera.requests import (
     Status,
     Stop,
 )
+from services.camera.web.connection import lost
 from services.camera.web.digest import Challenge, authorization, read_challenge
 from services.camera.web.gate import Gate
 
@@ -275,11 +276,14 @@ class Guarded(Web):
         super().__init__()
         self.password, self.uses, self.nonce, self.used = password, uses, 0, 0
         self.refused = 0
+        self.down = False
 
     def __call__(self, request: httpx.Request) -> httpx.Response:
+        self.used += 1
+        if self.down:
+            raise httpx.ConnectError("[Errno 111] Connection refused", request=request)
         response = super().__call__(request)
         given = request.headers.get("authorization", "")
-        self.used += 1
         uri = request.url.raw_path.decode()
         good = f'response="{self._expected(uri)}"' in given and self.used <= self.uses
         if good and f"nc={self.used:08x}" in given:
@@ -309,6 +313,53 @@ def test_a_nonce_is_used_again_with_the_next_count() -> None:
     for _ in range(20):
         device.send(Reboot())
     assert (len(web.asked), web.refused) == (21, 1)
+
+
+@pytest.mark.parametrize(
+    ("before", "uses", "another_nonce", "remembers"),
+    [(20, 1000, True, False), (20, 1000, False, True), (5, 1000, True, None), (20, 1, True, None)],
+)
+def test_who_it_is_says_whether_it_knew_the_login_after_it_was_away(
+    before: int, uses: int, another_nonce: bool, remembers: bool | None
+) -> None:
+    web = Guarded(uses=uses)
+    device = guarded(web)
+    for _ in range(before):
+        device.send(Reboot())
+    assert identity(device).remembers is None
+    web.down = True
+    for _ in range(3):
+        with pytest.raises(Away) as caught:
+            device.send(Reboot())
+        assert caught.value.turned_away
+    web.down = False
+    web.nonce += another_nonce
+    device.send(Reboot())
+    assert identity(device).remembers is remembers
+    assert identity(device).remembers is None
+
+
+def identity(device: amcrest.Amcrest) -> Identity:
+    told = device.send(Identify())
+    assert isinstance(told, Identity)
+    return told
+
+
+@pytest.mark.parametrize(
+    ("error", "turned_away"),
+    [
+        (httpx.ConnectError("[Errno 111] Connection refused"), True),
+        (httpx.ReadError("[Errno 104] Connection reset by peer"), True),
+        (httpx.RemoteProtocolError("Server disconnected without sending a response."), True),
+        (httpx.ConnectError("[Errno 113] No route to host"), False),
+        (httpx.ConnectTimeout("timed out"), False),
+        (httpx.ReadTimeout("timed out"), False),
+    ],
+)
+def test_a_camera_that_turns_connections_away_is_told_from_one_that_is_not_reached(
+    error: httpx.HTTPError, turned_away: bool
+) -> None:
+    assert lost(error).turned_away is turned_away
 
 
 def test_a_camera_that_takes_each_nonce_once_is_answered_with_one_repeat_and_soon_without_a_vain_login() -> None:

@@ -300,6 +300,7 @@ class Fault:
     shows: Callable[[Client], bool] = lambda bus: True  # besides the status; it is asked until it holds
     logged: Callable[[list[dict[str, Any]]], bool] = lambda log: True  # and in the requests that the camera met since
     back_s: float = 20.0  # after its end: everything is well again
+    restarts: bool = False  # it is told afterwards that the camera has restarted
 
     def __str__(self) -> str:
         return self.name
@@ -315,6 +316,12 @@ def met(bus: Client) -> bool:
     said = newest(bus, "diagnostics/camera/ip1")
     values = json.loads(said)["values"] if said else {}
     return bool(values.get("firmware")) and values.get("alarm") == "attached"
+
+
+def rebooted(bus: Client) -> str:
+    """When the camera restarted, as the diagnostics tell; nothing when they do not."""
+    said = newest(bus, "diagnostics/camera/ip1")
+    return str(json.loads(said)["values"].get("rebooted", "")) if said else ""
 
 
 def slow_answers(bus: Client) -> bool:
@@ -393,7 +400,7 @@ FAULTS = (
     Fault("nonce", ("online",), meanwhile=stays_usable, shows=ordered, logged=repeated),
     Fault("cut", ("offline",), shows=alarm_in_trouble),
     Fault("cut", ("offline",), {"refuses": True}, shows=alarm_in_trouble),
-    Fault("reboot", ("offline", "rebooting")),
+    Fault("reboot", ("offline",), shows=alarm_in_trouble, restarts=True),
     Fault("locked", ("locked",), back_s=40.0),
     Fault("rights", ("online",), shows=is_told_why, logged=refused_motion),
 )
@@ -408,7 +415,7 @@ def fault(flat: SmallFlat, which: Fault, *, camera: str = "ip1") -> float:
     with flat.client(f"camera/{camera}/#", f"diagnostics/camera/{camera}") as bus:
         bus.payload(f"camera/{camera}/motion", lambda motion: motion.value != -1, 20.0)
         wait(bus, lambda: met(bus), 20.0, "the camera to have said who it is, and its alarm that it lives")
-        began, since = time.monotonic(), time.time()
+        began, since, before = time.monotonic(), time.time(), rebooted(bus)
         door.tell("fault", name=which.name, **which.settings)
         if which.also:
             door.tell(which.also)
@@ -428,6 +435,9 @@ def fault(flat: SmallFlat, which: Fault, *, camera: str = "ip1") -> float:
         well(flat, bus, camera, which.back_s)
         bus.forget()
         wait(bus, lambda: good_snapshots(bus), which.back_s, "no complaint about snapshots")
+        if which.restarts:
+            wait(bus, lambda: rebooted(bus) != before, 5.0, "the diagnostics to tell of the restart")
+        assert (rebooted(bus) != before) == which.restarts
     assert flat.pid(f"camera-{camera}") == service, "it was restarted"
     return seconds
 

@@ -207,7 +207,8 @@ class Amcrest:
     def _identify(self) -> Identity:
         model = replies.read_table(self._get(system.magic("getDeviceType")).text).get("type", "")
         serial = replies.read_table(self._get(system.magic("getSerialNo")).text).get("sn", "")
-        return Identity(model, serial, system.read_version(self._get(system.magic("getSoftwareVersion")).text))
+        version = system.read_version(self._get(system.magic("getSoftwareVersion")).text)
+        return Identity(model, serial, version, self.login.recall())
 
 
 def ear(address: Address, gate: Gate, codes: tuple[str, ...], heartbeat_s: int) -> Ear:

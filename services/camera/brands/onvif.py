@@ -182,7 +182,8 @@ class Onvif:
     def _identify(self) -> Identity:
         told = self._ask(DEVICE, "GetDeviceInformation")
         keys = ("Model", "SerialNumber", "FirmwareVersion")
-        return Identity(*(told.findtext(f"{{{DEVICE}}}{key}") or "" for key in keys))
+        model, serial, version = (told.findtext(f"{{{DEVICE}}}{key}") or "" for key in keys)
+        return Identity(model, serial, version)
 
 
 def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:

@@ -10,6 +10,7 @@ from services.camera.web.digest import Login
 
 COMMAND = httpx.Timeout(6.0, connect=2.0)
 STOP = httpx.Timeout(6.0, connect=0.45)  # a lost knock is repeated by the kernel after 1 s only; we knock sooner
+TURNED_AWAY = ("refuses", "reset by peer", "disconnected without")  # which of httpx' errors say that, by their words
 SNAPSHOT = httpx.Timeout(20.0, connect=2.0)
 
 
@@ -26,11 +27,17 @@ def fetch(http: httpx.Client, target: str, timeout: httpx.Timeout = COMMAND) -> 
     try:
         return http.get(target, timeout=timeout)
     except httpx.HTTPError as error:
-        if isinstance(error, httpx.ConnectError) and "refused" in str(error):
-            raise Away(
-                "no answer from the camera: it refuses connections, is starting again or has no web server on"
-            ) from error
-        raise Away(f"no answer from the camera: {type(error).__name__} {error}".strip()) from error
+        raise lost(error) from error
+
+
+def lost(error: httpx.HTTPError) -> Away:
+    """What it means that there is no answer."""
+    text = f"{type(error).__name__} {error}".strip()
+    if isinstance(error, httpx.ConnectError) and "refused" in text:
+        text = "it refuses connections, is starting again or has no web server on"
+    away = Away(f"no answer from the camera: {text}")
+    away.turned_away = any(word in text for word in TURNED_AWAY)
+    return away
 
 
 def respelt(target: str) -> str:

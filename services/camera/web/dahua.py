@@ -15,7 +15,7 @@ from services.camera.address import Address
 from services.camera.brands.dahua import events, replies, system
 from services.camera.requests import Away, Event, Refused
 from services.camera.sound import g711
-from services.camera.web.connection import connection, fetch, respelt
+from services.camera.web.connection import connection, fetch, lost, respelt
 from services.camera.web.digest import Login, header, read_challenge
 from services.camera.web.endless import Endless
 from services.camera.web.gate import Gate
@@ -103,4 +103,4 @@ def _bare(http: httpx.Client, target: str) -> httpx.Response:
     try:
         return http.get(target, auth=None)
     except httpx.HTTPError as error:
-        raise Away(f"no answer from the camera: {type(error).__name__} {error}".strip()) from error
+        raise lost(error) from error

@@ -163,6 +163,13 @@ class Login(httpx.Auth):
         self.challenge: Challenge | None = None
         self.nonces = Nonces()
         self.refused = 0
+        self._answered = True  # the last request
+        self._known: bool | None = None
+
+    def recall(self) -> bool | None:
+        """Whether the camera knew an old login when it answered again after it had not; None: nothing tells. Once."""
+        known, self._known = self._known, None
+        return known
 
     def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
         """Sends with what is known, after a refusal with the new challenge, and after one more refusal once again.
@@ -171,6 +178,7 @@ class Login(httpx.Auth):
         """
         self.gate.give_way(urgent=self.urgent)
         self._enter()
+        again, self._answered = not self._answered, False
         refusals = 0
         for _ in range(MOST_SENDS):
             if self.challenge is None:
@@ -192,6 +200,8 @@ class Login(httpx.Auth):
                     login.passed()
                 elif outcome == "refused":
                     login.failed(sure=refusals > 0, odd=not old or self.nonces.reliable)
+            if old and again and self.nonces.reliable:
+                self._known = outcome == "passed"
             if old:
                 self.nonces.used(outcome)
             if outcome == "passed":
@@ -211,6 +221,7 @@ class Login(httpx.Auth):
 
     def _read(self, response: httpx.Response) -> Outcome:
         """What an answer says of the login, and the challenge in it; Locked when it says that. Stale: another nonce."""
+        self._answered = True
         if response.status_code != 401:
             return "passed"
         self.refused += 1

@@ -19,6 +19,7 @@ import httpx
 
 from services.camera.address import Address
 from services.camera.requests import Away, BadLogin, Locked, Refused
+from services.camera.web.connection import lost
 from services.camera.web.gate import ODD_S, Gate
 
 SOAP = "{http://www.w3.org/2003/05/soap-envelope}"
@@ -102,7 +103,7 @@ class Soap:
         try:
             answer = self.http.post(path, content=envelope(head, body), headers=HEADERS)
         except httpx.HTTPError as error:
-            raise Away(f"no answer from the camera: {type(error).__name__} {error}".strip()) from error
+            raise lost(error) from error
         if answer.status_code == 404:
             raise Refused("the camera has no such ONVIF service")
         if answer.status_code == 401 and not answer.content.lstrip().startswith(b"<"):
