@@ -65,14 +65,18 @@ class Here:
         self.bus.forget()
         self.give(key, value)
         wanted = json.loads(value) if value.startswith("{") else value
-        answers: list[OrderResult] = []
+        return self.answers(lambda result: (result.key, result.value) == (key, wanted), limit_s)
+
+    def answers(self, ours: Callable[[OrderResult], bool], limit_s: float = 40.0) -> list[OrderResult]:
+        """The answers to an order, those that have come already too, once there is one that ends it."""
+        found: list[OrderResult] = []
 
         def ended(result: OrderResult) -> bool:
-            answers.extend([result] if (result.key, result.value) == (key, wanted) else [])
-            return bool(answers) and answers[-1].final
+            found.extend([result] if ours(result) else [])
+            return bool(found) and found[-1].final
 
         self.bus.payload("camera/ip1/order_result", ended, limit_s)
-        return answers
+        return found
 
     def at(self, **axes: float) -> None:
         """Puts the camera there, and waits until the service has seen it."""
@@ -201,6 +205,15 @@ def zoomed(level: float | None) -> Step:
         assert not here.door.moving
 
     return check
+
+
+def zoomed_in(here: Here) -> None:
+    here.at(pan=60.0, tilt=20.0, zoom=8.0)
+
+
+def wider(here: Here) -> None:
+    assert here.door.state()["reading"]["zoom"] < 8
+    assert not here.door.moving
 
 
 def is_saved(here: Here) -> None:
@@ -360,6 +373,7 @@ CASES = (
     Case("Move", "Left 3 0.5", turned, stands_at(60.0, 20.0)),
     Case("Move", "Stop", still, turning),
     Case("Zoom", "In", zoomed(None), stands_at(60.0, 20.0)),
+    Case("Zoom", "Out", wider, zoomed_in),
     Case("Zoom", "4", zoomed(4.0), stands_at(60.0, 20.0)),
     Case("RTSP", "1", is_watched, after=stops_watching),
     Case("MJPEG", "ON", streams, after=ordered("MJPEG", "OFF")),
@@ -368,7 +382,9 @@ CASES = (
     Case("Privacy", "ON", option("LeLensMask[0].Enable", "true", "LeLensMask"), after=ordered("Privacy", "OFF")),
     Case("AudioRec", "1", hears_the_tone, a_tone),
     Case("AudioPlay", "ding.wav", is_played, a_file),
-    Case("VideoMode", "bw", option("VideoInOptions[0].DayNightColor", "2"), after=ordered("VideoMode", "color")),
+    Case("VideoMode", "bw", option("VideoInOptions[0].DayNightColor", "2")),
+    Case("VideoMode", "auto", option("VideoInOptions[0].DayNightColor", "1")),
+    Case("VideoMode", "color", option("VideoInOptions[0].DayNightColor", "0"), ordered("VideoMode", "bw")),
     Case("VideoMode", "scan", high_contrast, after=usual_contrast),
     Case("Scan", ONE_PLACE, found, stands_at(320.0, 36.0)),
     Case("Scan", "False", cancelled, scanning),
@@ -410,6 +426,94 @@ def test_what_is_out_of_range_is_refused_naming_it(here: Here, key: str, value: 
     answers = here.order(key, value)
     assert [answer.state for answer in answers] == ["refused"]
     assert allowed in str(answers[0].error)
+
+
+def test_each_diagonal_turns_both_ways_at_once(here: Here) -> None:
+    """To the right of the picture the pan grows, downwards the tilt."""
+    stands_at(60.0, 20.0)(here)
+    for way, right, down in (("LeftUp", -1, -1), ("RightDown", 1, 1), ("RightUp", 1, -1), ("LeftDown", -1, 1)):
+        before = here.door.state()["pose"]
+        assert here.order("Move", f"{way} 3 0.5")[-1].state == "done"
+        pose = here.door.state()["pose"]
+        assert right * (pose["pan"] - before["pan"]) > 1.0, way
+        assert down * (pose["tilt"] - before["tilt"]) > 0.5, way
+        assert not here.door.moving
+
+
+def ours(order_id: str) -> Callable[[OrderResult], bool]:
+    return lambda result: result.id == order_id
+
+
+def test_every_answer_to_an_order_in_json_carries_its_id(here: Here) -> None:
+    stands_at(60.0, 20.0)(here)
+    here.bus.forget()
+    name = f"mine, by {here.how}"
+    here.give("Move", json.dumps({"value": "Left 3 0.5", "id": name, "by": "human"}))
+    answers = here.answers(lambda result: result.key == "Move")
+    assert [(one.id, one.value, one.state) for one in answers] == [
+        (name, "Left 3 0.5", state) for state in ("accepted", "running", "done")
+    ]
+    turned(here)
+
+
+@pytest.fixture
+def both(flat: SmallFlat, clients: list[subprocess.Popen[bytes]]) -> Iterator[tuple[Here, Here]]:
+    """Two people who hear the same: one gives orders with mosquitto_pub, one with rostopic pub."""
+    with flat.client("camera/ip1/#") as bus:
+        yield Here(flat, bus, HOWS[0], clients), Here(flat, bus, HOWS[1], clients)
+
+
+def test_the_same_move_again_prolongs_it_whoever_gives_it(both: tuple[Here, Here]) -> None:
+    one, other = both
+    stands_at(60.0, 20.0)(one)
+    one.bus.forget()
+    met = len(one.door.log())
+    other.give("Move", "Left 2 2")
+    one.until(lambda: apart(one.door.state()["pose"]["pan"], 60.0) > 2, "the camera to turn")
+    one.give("Move", "Left 2 2")
+    answers: list[OrderResult] = []
+    one.answers(lambda result: answers.append(result) or len([each for each in answers if each.final]) == 2)
+    by_id = [[each.state for each in answers if each.id == name] for name in {each.id for each in answers}]
+    assert by_id == [["accepted", "running", "done"]] * 2
+    sent = [entry for entry in one.door.log()[met:] if "code=Left&" in entry["target"] and entry["status"] == 200]
+    starts, stops = ([e["time"] for e in sent if f"action={how}" in e["target"]] for how in ("start", "stop"))
+    assert len(starts) == 1
+    assert stops[0] - starts[0] > 2.5  # 2 s of the first, and that again after 2 of its 6 degrees
+    assert not one.door.moving
+
+
+def test_a_person_s_goto_ends_a_scan(both: tuple[Here, Here]) -> None:
+    one, other = both
+    one.bus.forget()
+    other.give("Scan", json.dumps({"value": True, "id": "scan", "by": "human"}))
+    one.until(lambda: one.said("scan/state")["state"] == "running" and one.door.moving, "the scan")
+    one.give("Goto", json.dumps({"value": "Desk", "id": "goto", "by": "human"}))
+    assert one.answers(ours("goto"))[-1].state == "done"
+    lost = one.answers(ours("scan"))[-1]
+    assert (lost.state, lost.error) == ("cancelled", "the human's order Goto goes first")
+    looks_at("Desk")(one)
+    cancelled(one)
+
+
+def test_a_mission_s_order_loses_against_a_person_s_that_runs_and_gives_way_to_one(both: tuple[Here, Here]) -> None:
+    mission, person = both
+    stands_at(60.0, 20.0)(mission)
+    mission.bus.forget()
+    person.give("Move", json.dumps({"value": "Right 1 20", "id": "first", "by": "human"}))
+    mission.until(lambda: mission.door.moving, "the camera to turn")
+    mission.give("Goto", json.dumps({"value": "Desk", "id": "loses", "by": "mission"}))
+    lost = mission.answers(ours("loses"))
+    assert [one.state for one in lost] == ["accepted", "cancelled"]
+    assert lost[-1].error == "the human's order Move goes first"
+    assert mission.door.moving
+    mission.give("Move", json.dumps({"value": "Stop", "id": "stop", "by": "human"}))
+    mission.answers(ours("stop"))
+    mission.give("Goto", json.dumps({"value": "Desk", "id": "way", "by": "mission"}))
+    mission.bus.payload("camera/ip1/order_result", lambda one: (one.id, one.state) == ("way", "running"), 20.0)
+    mission.give("Position", '{"pan": 70.0, "tilt": 25.0, "zoom": 0.0, "id": "last"}')
+    assert mission.answers(ours("last"))[-1].state == "done"
+    assert mission.answers(ours("way"))[-1].error == "the human's order Position goes first"
+    near(mission, 70.0, 25.0)
 
 
 def test_calibrating_turns_the_camera_and_a_stop_ends_it(here: Here) -> None:
