@@ -516,6 +516,33 @@ def test_a_mission_s_order_loses_against_a_person_s_that_runs_and_gives_way_to_o
     near(mission, 70.0, 25.0)
 
 
+def test_a_place_that_is_written_by_hand_can_be_gone_to_and_a_broken_file_changes_nothing(
+    both: tuple[Here, Here],
+) -> None:
+    here, _ = both
+    file, log = here.flat.folder / "config" / "ip1" / "preset_position.yaml", here.flat.folder / "run.log"
+    before, line = file.read_text(), "the places stay as they were"
+    told = log.read_text().count(line)
+    try:
+        file.write_text(f"{before}Nook: [70.0, 25.0, 0]\n")
+        here.until(lambda: "Nook" in here.retained("places"), "the new place")
+        assert here.order("Goto", "Nook")[-1].state == "done"
+        near(here, 70.0, 25.0)
+        places = here.retained("places")
+        file.write_text(f"{before}Nook: [10.0, 25.0, 0]\nHole: [1, 2\n")
+        here.until(lambda: log.read_text().count(line) > told, "a line in the log")
+        faulty = f"{file.name}:{len(before.splitlines()) + 3}:"
+        assert [line in one and faulty in one for one in log.read_text().splitlines() if line in one][told:] == [True]
+        stands_at(60.0, 20.0)(here)
+        assert here.order("Goto", "Nook")[-1].state == "done"
+        near(here, 70.0, 25.0)
+        assert here.retained("places") == places
+        assert log.read_text().count(line) == told + 1
+    finally:
+        file.write_text(before)
+    here.until(lambda: "Nook" not in here.retained("places"), "the place to be gone")
+
+
 def test_calibrating_turns_the_camera_and_a_stop_ends_it(here: Here) -> None:
     """The whole of it takes most of a minute; it is tried in virtual time."""
     stands_at(60.0, 20.0)(here)
