@@ -26,7 +26,7 @@ from tests.small_flat import Door, SmallFlat, small_flat
 
 pytestmark = [pytest.mark.mosquitto, pytest.mark.ros]
 SIMULATOR = {"latency_s": 0.05, "switches": {"boot_s": 3.0, "lens_mask": True}}
-CAMERA = {"frames": 1, "discovery": True}
+CAMERA = {"frames": 1, "discovery": True, "motion": {"hold_s": 2.0}}
 HOWS = ("mosquitto_pub", "rostopic pub")
 
 
@@ -625,3 +625,29 @@ def test_what_home_assistant_sends_is_carried_out(panel: Panel) -> None:
     panel.ends("Scan", "cancelled")
     panel.ends("Move", "done")
     assert not here.door.moving
+
+
+def test_home_assistant_sees_motion_and_its_reboot_button_reboots(panel: Panel) -> None:
+    here = panel.here
+    sensor = panel.entity("binary_sensor.motion")
+
+    def shows(word: str) -> Callable[[], bool]:
+        def seen() -> bool:
+            value = here.said(sensor["state_topic"].removeprefix("camera/ip1/"))
+            return Environment().from_string(sensor["value_template"]).render(value_json=value) == word
+
+        return seen
+
+    def somebody_walks() -> bool:
+        here.door.tell("event", code="VideoMotion", action="Start")  # soon after its own motion that counts for nothing
+        return shows("ON")()
+
+    here.until(shows("OFF"), "no motion")
+    here.until(somebody_walks, "motion")
+    here.door.tell("event", code="VideoMotion", action="Stop")
+    here.until(shows("OFF"), "the end of it")
+    here.bus.seen[:] = [one for one in here.bus.seen if one.topic.startswith("homeassistant/")]
+    panel.press("button.reboot", "payload_press")
+    here.until(lambda: here.door.state()["booting"], "the camera to be down")
+    panel.ends("Reboot", "done")
+    rebooted(here)
