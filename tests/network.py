@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 
 PIECE = 65536
 POLL_S = 0.05
@@ -27,6 +28,7 @@ class Network:
         self._flowing, self._parked, self._closing = threading.Event(), threading.Event(), threading.Event()
         self._flowing.set()
         self.let_in: list[float] = []  # when a connection was, seconds since 1970
+        self.spoke: list[float] = []  # when whoever was let in said its first word to the other side
         self._lost: list[socket.socket] = []  # our own that fill the queue, and who was let in too late
         self._open: set[socket.socket] = set()
         self._far: set[socket.socket] = set()
@@ -112,9 +114,13 @@ class Network:
                 thread.start()
 
     def _pump(self, source: socket.socket, target: socket.socket, ends: threading.Barrier) -> None:
+        silent = target in self._far
         with suppress(OSError):
             while piece := source.recv(PIECE):
                 self._flowing.wait()
+                if silent:
+                    self.spoke.append(time.time())
+                    silent = False
                 target.sendall(piece)
         self._flowing.wait()
         with suppress(OSError):
@@ -126,6 +132,24 @@ class Network:
             self._open.discard(one)
             self._far.discard(one)
             one.close()
+
+
+@dataclass(frozen=True)
+class Link:
+    """The way to a camera's web server and that to its video: they are cut and mended together."""
+
+    web: Network
+    video: Network
+
+    def cut(self) -> None:
+        """See `Network`."""
+        self.web.cut()
+        self.video.cut()
+
+    def mend(self) -> None:
+        """See `Network`; the way to the video first: whoever wants that could come first."""
+        self.video.mend()
+        self.web.mend()
 
 
 @contextmanager

@@ -24,7 +24,7 @@ from services.client import Client, connected
 from services.config import BusSettings
 from services.peers import free_port, mosquitto, ros, running
 from services.simulated import CONFIG
-from tests.network import Network, network
+from tests.network import Link, network
 
 READY_S = 60.0
 PASSWORD = "only-simulated"
@@ -67,7 +67,7 @@ class SmallFlat:
     doors: dict[str, Door]
     urls: dict[str, str]
     ros: ros.Master | None = None
-    networks: dict[str, Network] = field(default_factory=dict)
+    networks: dict[str, Link] = field(default_factory=dict)
     _broker: ExitStack = field(default_factory=ExitStack)
     _services: ExitStack = field(default_factory=ExitStack)
 
@@ -177,14 +177,18 @@ def small_flat(
         master = stack.enter_context(ros.private(folder / "ros")) if with_ros else None
         config = Path(shutil.copytree(CONFIG, folder / "config")) / "small.yaml"
         ports, streams = ({name: free_port() for name in doors} for _ in range(2))
-        networks = {name: stack.enter_context(network(ports[name])) for name in doors if networked}
-        near = {name: networks[name].port if networked else ports[name] for name in doors}
+        networks = {
+            name: Link(stack.enter_context(network(ports[name])), stack.enter_context(network(streams[name])))
+            for name in doors if networked
+        }  # fmt: skip
+        near = {name: networks[name].web.port if networked else ports[name] for name in doors}
+        videos = {name: networks[name].video.port if networked else streams[name] for name in doors}
         sections = {
             "bus": {"port": broker.port},
             "state": str(folder / "state"),
             "home": "home.yaml",
             "cameras": {
-                name: {**_camera(name, near[name], folder), "rtsp_port": streams[name], **(camera or {})}
+                name: {**_camera(name, near[name], folder), "rtsp_port": videos[name], **(camera or {})}
                 for name in doors},
             "simulators": {"cameras": {
                 name: {**_simulator(ports[name], door), "rtsp_port": streams[name], **(simulator or {}),

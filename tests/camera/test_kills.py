@@ -56,3 +56,9 @@ def test_the_same_when_it_was_cut_for_longer(flat: SmallFlat) -> None:
 
 def test_a_move_that_the_firmware_times_ends_by_itself_while_the_network_is_cut(flat: SmallFlat) -> None:
     assert trials.cut_timed_move(flat) < trials.TIMED_S + GRACE_S
+
+
+@pytest.mark.rtsp
+def test_a_stream_that_was_on_does_not_log_in_before_the_stop_although_it_could(flat: SmallFlat) -> None:
+    with trials.watched(flat):  # an attempt from before the camera was missed ends within 5 s
+        assert trials.cut_network(flat, seconds=5.5, video_s=4.0) < trials.REACHED_S

@@ -20,6 +20,7 @@ from typing import Any
 from services import peers
 from services.bus import Message
 from services.client import Client
+from services.payloads import CameraStatus
 from services.topics import read
 from tests.small_flat import Door, SmallFlat, end_orphans
 
@@ -195,26 +196,34 @@ def kill_broker(flat: SmallFlat, moving: Mapping[str, Motion] = MOVING) -> float
     return seconds
 
 
-def cut_network(flat: SmallFlat, *, camera: str = "ip1", seconds: float = 0.0) -> float:
+def cut_network(flat: SmallFlat, *, camera: str = "ip1", seconds: float = 0.0, video_s: float = 0.0) -> float:
     """The network goes in the middle of a move, and comes back `seconds` after that was noticed.
 
-    The camera turns on; the stop is the first that reaches it. Seconds from the return until then.
+    The camera turns on; the stop is the first that reaches it, although its video could be had `video_s` sooner.
+    Seconds from the return until then.
     """
     door, net = flat.doors[camera], flat.networks[camera]
     with flat.client(f"camera/{camera}/#") as bus:
         turn(bus, flat, {camera: replace(MOVE, payload="Left 2 6")})
         with without_network(flat, bus, camera):
+            cut = time.time()
             stays_degraded(bus, camera, seconds)
+            if video_s:
+                net.video.mend()
+                bus.collect(video_s)
+                bus.forget()
             assert door.moving, "a camera without a network turns on"
             met = len(door.log())
         back = time.time()
         peers.wait_until(lambda: len(door.log()) > met, "a request", 10.0)
         first = door.log()[met]
+        looked = [round(when - back, 3) for when in net.video.spoke if cut < when < first["time"]]
         until_still(door)
         well_again(bus, door, camera)
     assert "action=stop" in first["target"], f"the first request was {first['target']}"
     reached = float(first["time"]) - back
-    knocked = [round(when - back, 3) for when in net.let_in if when > back]
+    assert not looked, f"somebody wanted its picture before that, at {looked}"
+    knocked = [round(when - back, 3) for when in net.web.let_in if when > back]
     assert reached < REACHED_S, f"{reached:.3f} s after the return; connections were let in at {knocked}"
     return reached
 
@@ -250,7 +259,7 @@ def without_network(flat: SmallFlat, bus: Client, camera: str) -> Iterator[None]
 
 def stays_degraded(bus: Client, camera: str, seconds: float) -> None:
     """The status tells of the lost camera in time, and says nothing else for so many seconds then."""
-    bus.payload(f"camera/{camera}/status", lambda status: status.state == "degraded", NOTICED_S)
+    bus.payload(f"camera/{camera}/status", lost_in_a_move, NOTICED_S)
     bus.collect(seconds)
     said = [json.loads(message.payload)["state"] for message in bus.seen if message.topic == f"camera/{camera}/status"]
     assert set(said[said.index("degraded") :]) == {"degraded"}, said
@@ -262,6 +271,23 @@ def well_again(bus: Client, door: Door, camera: str) -> None:
     bus.payload(f"camera/{camera}/status", lambda status: status.state == "online", 15.0)
     rests(door)
     takes_orders(bus, camera)
+
+
+def lost_in_a_move(status: CameraStatus) -> bool:
+    """Whether it says that the camera is lost while it turns; without its stream alone it is degraded too."""
+    return status.state == "degraded" and "no answer from the camera" in status.reason
+
+
+@contextmanager
+def watched(flat: SmallFlat, *, camera: str = "ip1") -> Iterator[None]:
+    """Its stream is on, and a picture has come; in the end it was asked for another time."""
+    spoke = flat.networks[camera].video.spoke
+    with flat.client(f"camera/{camera}/order_result") as bus:
+        assert bus.order(camera, "RTSP", "True").state == "done"
+        began = len(spoke)
+        yield
+        peers.wait_until(lambda: len(spoke) > began, "the stream to be opened again", 20.0)
+        assert bus.order(camera, "RTSP", "False").state == "done"
 
 
 def speaks(bus: Client, camera: str) -> None:
