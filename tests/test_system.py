@@ -188,11 +188,12 @@ def test_a_command_that_is_said_to_be_kept_is_refused_and_counted_by_who_is_ther
         shell.mosquitto_pub("-r", "-t", topic, "-n")  # taken away again: that is no command either
     for service, topic, _ in KEPT:
         assert trials.counters(bus, service, bad[service] + 2)["bad"] == bad[service] + 2, topic
-    answers = {m.topic for m in bus.seen if re.search("reply|result|Bedroom_Mode/state", m.topic)}
-    assert answers == {"camera/ip1/order_result"}
-    ends = [json.loads(m.payload) for m in bus.seen if m.topic == "camera/ip1/order_result"]
-    assert {(end["key"], end["state"]) for end in ends} == {("Flip", "refused")}
-    assert "retained" in ends[0]["error"]
+    told = [m for m in bus.seen if re.search("reply|result|Bedroom_Mode/state", m.topic)]
+    answers = {topic: [json.loads(m.payload) for m in told if m.topic == topic] for topic in {m.topic for m in told}}
+    assert set(answers) == {"camera/ip1/order_result", "history/reply/kept"}
+    assert {(end["key"], end["state"]) for end in answers["camera/ip1/order_result"]} == {("Flip", "refused")}
+    assert all("retained" in answer[0]["error"] for answer in answers.values())
+    assert answers["history/reply/kept"][0]["samples"] == []
 
 
 def test_a_scan_finds_the_marker_where_it_really_is_and_everyone_learns_it(flat: Simulated, shell: Shell) -> None:

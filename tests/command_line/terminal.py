@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -65,12 +66,18 @@ class Terminal:
         return [self.lines.get() for _ in range(self.lines.qsize())]
 
 
+def _hears_ctrl_c() -> None:
+    """As in a terminal, also where the tests run in the background of a shell, which has it ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @contextmanager
 def apartment(config: Path, *words: str) -> Iterator[Terminal]:
     """Runs a command until the end of the block."""
     process = subprocess.Popen(
         [sys.executable, "-m", "services", *words, "--config", str(config)], stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True, cwd=ROOT, env=os.environ,
+        preexec_fn=_hears_ctrl_c,
     )  # fmt: skip
     assert process.stdout is not None
     try:

@@ -26,6 +26,7 @@ MOST_SENDS = 6  # of one request: bare, old nonce, new, new after a while, and a
 VAIN, SELDOM = 4, 100  # old nonces refused in a row until they are no longer tried; then one in so many requests
 DOUBTED = 10  # so many requests go without an old nonce after one was refused and nothing said why
 RELIABLE = 20  # old nonces taken in a row, after which a refusal is hardly one of the nonce
+RELIED = 10  # as many, after which a camera that was away and refuses one has lost them
 HASHES = {"md5": hashlib.md5, "sha-256": hashlib.sha256}
 Outcome = Literal["passed", "stale", "refused"]
 
@@ -200,7 +201,7 @@ class Login(httpx.Auth):
                     login.passed()
                 elif outcome == "refused":
                     login.failed(sure=refusals > 0, odd=not old or self.nonces.reliable)
-            if old and again and self.nonces.reliable:
+            if old and again and self.nonces.taken >= RELIED:
                 self._known = outcome == "passed"
             if old:
                 self.nonces.used(outcome)
