@@ -224,7 +224,7 @@ def stand_still(
 ) -> bool:
     """Sends a stop until it is confirmed and two readings are equal; whether that was so within the limit.
 
-    What the firmware drives by itself has no stop of its own everywhere: a slow start takes its place, which has.
+    What the firmware drives by itself has no stop of its own everywhere: a slow start takes its place, once, which has.
     """
     end = clock() + limit_s
     every, drives = False, direction == DRIVE
@@ -234,6 +234,7 @@ def stand_still(
         try:
             if drives:
                 camera.send(Start(Direction.LEFT))
+                drives = False
             camera.send(Stop(every=every, direction=direction))
             camera.send(Status())  # it may lag behind the motor
             asked, before = clock(), camera.send(Status())

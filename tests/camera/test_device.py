@@ -156,6 +156,13 @@ def test_what_the_firmware_drives_by_itself_is_ended_by_a_start_that_can_be_stop
     assert camera.got[:2] == [Start(Direction.LEFT), Stop(direction=Direction.LEFT)]
 
 
+def test_that_start_is_not_made_again_where_the_stop_has_to_be() -> None:
+    camera = Slow(deaf=2)
+    camera.leave.set()
+    assert stand_still(camera, lambda: 0.0, 1.0, direction=DRIVE)
+    assert [type(one) for one in camera.got if not isinstance(one, Status)] == [Start, Stop, Stop, Stop]
+
+
 def test_the_watchdog_hears_of_a_drive_and_of_its_end() -> None:
     told: list[object] = []
     control, pictures = Slow(), Slow()
