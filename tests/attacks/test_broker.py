@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -109,4 +110,6 @@ def test_a_question_that_an_intruder_left_retained_is_refused_by_the_service_tha
 
             wait_until(lambda: answered("left") or runner.counters["bad"] > 0, "what was left", LIMIT_S)
             wait_until(lambda: intruder.say(topic, asked) or answered("asked"), "an answer", LIMIT_S)  # type: ignore[func-returns-value]
-            assert not answered("left")
+            told = [json.loads(message.payload) for message in intruder.seen if message.topic == "history/reply/left"]
+            assert all("retained" in answer["error"] and not answer["samples"] for answer in told)
+            assert runner.counters["bad"] > 0
