@@ -134,7 +134,8 @@ class Persistence:
         row = rows.read(known, self._next_time(message.received or now), self._home) if known.topic.stored else None
         if row is None or not self._writers.takes(row):
             return ()
-        if isinstance(row, rows.State) and self._restore.saw(row.item, row.text):
+        again = message.token is not None and message.token.again
+        if isinstance(row, rows.State) and self._restore.saw(row.item, row.text, again=again):
             self._decisions.heard(row)
         else:
             self._gathered.append((row, message))

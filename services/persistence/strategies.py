@@ -112,9 +112,13 @@ class Restore:
         if mark and mark == self.mark:
             self.due = now + self._patience_s
 
-    def saw(self, item: str, text: str) -> bool:
-        """A state of an item came, so it needs no restoring. True when it is the echo of our own restoring."""
-        self._waiting.discard(item)
+    def saw(self, item: str, text: str, *, again: bool = False) -> bool:
+        """A state of an item came, so it needs no restoring. True when it is the echo of our own restoring.
+
+        `again`: it was handed to us before; whether the broker still has it, its retained states tell.
+        """
+        if not again:
+            self._waiting.discard(item)
         return self._own.pop(item, None) == text
 
     def missing(self, now: float) -> list[str]:

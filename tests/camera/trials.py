@@ -20,8 +20,8 @@ from typing import Any
 from services import peers
 from services.bus import Message
 from services.client import Client
-from services.payloads import CameraStatus
-from services.topics import read
+from services.payloads import CameraStatus, Order
+from services.topics import CAMERA_ORDER, read
 from tests.small_flat import Door, SmallFlat, end_orphans
 
 NOTICED_S = 15.0  # a fault shows in the status within this
@@ -74,7 +74,9 @@ def durations(bus: Client, cameras: list[str], turns: int) -> Durations:
     found: Durations = []
     for key, value in ORDERS * turns:
         began = time.time()
-        given = {bus.give(name, key, value): name for name in cameras}
+        given = {f"{name}-{len(found)}-{began}": name for name in cameras}
+        for order_id, name in given.items():
+            bus.publish(CAMERA_ORDER.message(Order(value=value, id=order_id), cam=name, key=key))
         while given:
             end = bus.until(partial(ends, given), 60.0, f"the end of {key} {value}")
             result = read(end, end.received).payload
