@@ -94,6 +94,14 @@ class TestRestore:
         restore.heard("m2", 0.0)
         assert restore.missing(2.0) == ["Door"]
 
+    def test_what_is_handed_out_again_tells_nothing_of_what_the_broker_has(self) -> None:
+        restore = waiting("Light", "Door")
+        restore.saw("Light", "ON", again=True)
+        restore.saw("Door", "OPEN", again=True)
+        restore.saw("Door", "OPEN")
+        restore.heard("m2", 0.0)
+        assert restore.missing(2.0) == ["Light"]
+
     def test_the_echo_of_a_restored_state_is_known_once(self) -> None:
         restore = Restore(["Light"], 0.0)
         restore.says("Light", "ON")
