@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from services.camera.requests import Away, Identity, Reply
+from services.camera.device import Away, Identity, Reply
 
 BOOT_S = 20.0  # 40 to 105 s were seen; so long nobody is turned away for another reason
 

@@ -13,8 +13,8 @@ from typing import Literal, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
+from services.camera.device import Away, Errand, Identity
 from services.camera.plan import Plan, attempt, wait
-from services.camera.requests import Away, Errand, Identity
 from services.whole_file import write_whole
 
 BUSY_S = 1.0  # between two looks whether the camera has nothing else to do

@@ -9,13 +9,7 @@ from services.camera import commands, orders
 from services.camera.bulletin import Bulletin
 from services.camera.calibration.calibrator import Calibrator
 from services.camera.calibration.wishes import TakeLens
-from services.camera.health import Health
-from services.camera.looks import Looks
-from services.camera.orders import Command
-from services.camera.places import Places
-from services.camera.plan import Plan, ask, attempt, wait
-from services.camera.ptz.stand import settle
-from services.camera.requests import (
+from services.camera.device import (
     Away,
     ClearPreset,
     Picture,
@@ -26,6 +20,12 @@ from services.camera.requests import (
     SetPicture,
     Status,
 )
+from services.camera.health import Health
+from services.camera.looks import Looks
+from services.camera.orders import Command
+from services.camera.places import Places
+from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.ptz.stand import settle
 from services.camera.scan.scanner import Scanner
 from services.camera.sound.takes import Takes
 from services.camera.video.feed import Feed

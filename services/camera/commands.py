@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, Self
 
-from services.camera.requests import Mode
+from services.camera.device import Mode
 
 MODES: dict[str, Mode | Literal["scan"]] = {"color": "color", "bw": "bw", "auto": "auto", "scan": "scan"}
 LONGEST_RECORDING_S = 600.0

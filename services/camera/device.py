@@ -1,260 +1,296 @@
-"""The threads that talk to the camera: one for control, one for pictures, one request in flight in each.
+"""What can be asked of any camera, and what it answers: values without a brand, a socket or a clock.
 
-A Stop overtakes everything that waits, and what waits to start a motion is dropped by it. Replies go to the inbox
-as `/camera/reply`. Not here: what is asked (`requests.py`), how it is said (`brands/`).
+The requests become a brand's own words in `brands/`; who may send them, and in which order, is `lanes.py`.
+
+    DeviceError
+    ├── Refused     the camera answered, and said no
+    ├── BadLogin    the camera does not know this user and password
+    │   └── Locked  too many wrong passwords: the account is closed for a while
+    └── Away        no answer, or one that makes no sense
 """
 
 from __future__ import annotations
 
-import itertools
-import logging
-import threading
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from heapq import heappop, heappush
-from typing import Final, Literal, Protocol
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+from typing import Literal, Protocol
 
-from services.bus import Message
-from services.camera.requests import (
-    Away,
-    Camera,
-    Direction,
-    GotoPreset,
-    MoveOver,
-    MoveTo,
-    Rank,
-    Reading,
-    Refused,
-    Reply,
-    Request,
-    Start,
-    Status,
-    Stop,
-    TurnFor,
-)
 from services.errors import DeviceError
-from services.runner import Post
 
-REPLY = "/camera/reply"
-GAP_S = 0.45  # between two readings that are compared: the slowest speed shows in that time
-STILL_DEG = 0.25  # two readings nearer than this are the same: the resolution is 0.1 degree, and some dither by that
-STOP_ALONE_S = 1.0  # longer than the pause between two tries of a stop
-END_S = 3.5  # the end of the service waits so long for a camera to stand still; then its watchdog goes on
-
-DRIVE: Final = "drive"  # what turns when the firmware drives by itself
-Turning = Callable[[Direction | Literal["drive"] | None], None]
-
-FIRMWARE = GotoPreset | MoveTo | MoveOver | TurnFor
-log = logging.getLogger(__name__)
+Mode = Literal["color", "bw", "auto"]
 
 
-class Sender(Protocol):
-    """What the service needs of a device; in virtual time another one does the same without threads."""
-
-    def submit(self, request: Request, ticket: int) -> None:
-        """Sends when its turn has come; the answer is a `/camera/reply` message with this ticket."""
-        ...
-
-    def close(self) -> None:
-        """Drops what waits, makes sure that nothing moves, and ends."""
-        ...
+class Refused(DeviceError):
+    """The camera answered, and said no."""
 
 
-@dataclass(order=True)
-class _Waiting:
-    rank: Rank
+class BadLogin(DeviceError):
+    """The camera does not know this user and password; nobody tries again for `again_s`."""
+
+    def __init__(self, text: str, again_s: float = 120.0) -> None:
+        super().__init__(text)
+        self.again_s = again_s
+
+
+class Locked(BadLogin):
+    """Too many wrong passwords: the account is closed for a while."""
+
+
+class Away(DeviceError):
+    """No answer in time, or one that makes no sense. `turned_away`: its address answers, and nobody serves there."""
+
+    turned_away = False
+
+
+class Rank(IntEnum):
+    """What goes first when several requests wait; pictures have a lane of their own."""
+
+    STOP = 0
+    MOVE = 1
+    STATUS = 2
+    CONFIG = 3
+    PICTURE = 4
+
+
+class Direction(Enum):
+    """Where a camera can be told to turn, as its picture shows it: (right, down, in) each -1, 0 or 1."""
+
+    LEFT = (-1, 0, 0)
+    RIGHT = (1, 0, 0)
+    UP = (0, -1, 0)
+    DOWN = (0, 1, 0)
+    LEFT_UP = (-1, -1, 0)
+    RIGHT_UP = (1, -1, 0)
+    LEFT_DOWN = (-1, 1, 0)
+    RIGHT_DOWN = (1, 1, 0)
+    ZOOM_IN = (0, 0, 1)
+    ZOOM_OUT = (0, 0, -1)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Turn until Stop; speeds 1 to 8, `tilt_speed` for the vertical part of a diagonal (None: the same)."""
+
+    direction: Direction
+    speed: int = 1
+    tilt_speed: int | None = None
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
+class TurnFor:
+    """Turn for some seconds and end by itself; percent of the top speed, -100 to 100. Newer firmware only."""
+
+    right: int
+    down: int
+    zoom: int
+    seconds: float
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
+class MoveTo:
+    """Let the firmware drive to readings. `form`: it has one of two ways to say that, or none."""
+
+    pan: float
+    tilt: float
+    zoom: float
+    form: Literal["PositionABS", "moveAbsolutely"] = "PositionABS"
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
+class MoveOver:
+    """Let the firmware drive on by parts of its whole scale, -1 to 1 (that is learnt), and by levels of zoom."""
+
+    right: float
+    down: float
+    zoom: float = 0.0
+    form: Literal["Position", "moveRelatively"] = "Position"
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
+class Stop:
+    """End all motion. `every`: whatever may be running, also what somebody else started; `direction`: this one."""
+
+    every: bool = False
+    direction: Direction | None = None
+    rank = Rank.STOP
+
+
+@dataclass(frozen=True)
+class Status:
+    """Where it looks; the answer is a Reading."""
+
+    rank = Rank.STATUS
+
+
+@dataclass(frozen=True)
+class GotoPreset:
+    """Let the camera's firmware drive to one of its presets."""
+
     number: int
+    rank = Rank.MOVE
+
+
+@dataclass(frozen=True)
+class SavePreset:
+    """Keep the present pose as a preset of the camera."""
+
+    number: int
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class ClearPreset:
+    """Forget a preset of the camera."""
+
+    number: int
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A full-size picture; the answer is the bytes of a JPEG."""
+
+    rank = Rank.PICTURE
+
+
+@dataclass(frozen=True)
+class GetPicture:
+    """How the picture is delivered; the answer is a Picture."""
+
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class SetPicture:
+    """Changes how the picture is delivered; None leaves as it is. The answer is the Picture read back.
+
+    `contrast`: that of each profile, 0 to 100, at once with the mode; it is not in the answer.
+    """
+
+    flip: bool | None = None
+    mirror: bool | None = None
+    mode: Mode | None = None
+    contrast: tuple[int, ...] = ()
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class FindStream:
+    """Where the moving picture is; the answer is a StreamAddress, or None when the camera has none."""
+
+    source: Literal["main", "sub"]
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class Identify:
+    """Who are you; the answer is an Identity."""
+
+    rank = Rank.CONFIG
+
+
+@dataclass(frozen=True)
+class Reboot:
+    """Start again."""
+
+    rank = Rank.CONFIG
+
+
+class Errand:
+    """Base of the requests about the device itself (`errands.py`); a brand may refuse any of them."""
+
+    rank = Rank.CONFIG
+
+
+Request = (
+    Start
+    | TurnFor
+    | MoveTo
+    | MoveOver
+    | Stop
+    | Status
+    | GotoPreset
+    | SavePreset
+    | ClearPreset
+    | Snapshot
+    | GetPicture
+    | SetPicture
+    | FindStream
+    | Identify
+    | Reboot
+    | Errand
+)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Pan and tilt in degrees and zoom in levels, as the camera tells them. `moving` None: it does not say."""
+
+    pan: float
+    tilt: float
+    zoom: float
+    moving: bool | None = None
+
+
+@dataclass(frozen=True)
+class Picture:
+    """How the picture is delivered."""
+
+    flip: bool
+    mirror: bool
+    mode: Mode
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Which camera this is. `remembers`: whether it knew our login after it had been away; None: nothing tells."""
+
+    model: str
+    serial: str
+    version: str
+    remembers: bool | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
+class StreamAddress:
+    """Addresses of a camera's moving picture, never with a password in them; `mjpeg` is a path of its HTTP server."""
+
+    rtsp: str | None
+    mjpeg: str | None = None
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that the camera noticed by itself: `action` Start, Stop, Pulse or State; no code: it is alive."""
+
+    code: str
+    action: str
+    index: int = 0
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What became of a request: `result`, or the `error`; `sent` and `received` in seconds since 1970."""
+
     request: Request
     ticket: int
+    result: object
+    error: DeviceError | None
+    sent: float
+    received: float
 
 
-class Lane:
-    """One thread, one connection, one request in flight."""
+class Camera(Protocol):
+    """What a brand offers: one request at a time, from one thread."""
 
-    def __init__(
-        self,
-        name: str,
-        camera: Camera,
-        post: Post,
-        clock: Callable[[], float],
-        turning: Turning = lambda direction: None,
-        owing: Callable[[bool], None] = lambda on: None,
-    ) -> None:
-        self.camera = camera
-        self.owing = owing
-        self.post = post
-        self.clock = clock
-        self.turning = turning
-        self.started = False  # a motion may be running
-        self._others_at = 0.0  # until then only a stop is sent
-        self._met = False  # it has told where it looks, and so has been logged in to
-        self._driven: Reading | None = None  # the last reading since the firmware began to drive
-        self._drives = False
-        self._waiting: list[_Waiting] = []
-        self._numbers = itertools.count()
-        self._changed = threading.Condition()
-        self._closing = False
-        self.thread = threading.Thread(target=self._run, name=name, daemon=True)
-        self.thread.start()
-
-    def put(self, request: Request, ticket: int) -> None:
-        """Lets a request wait for its turn."""
-        with self._changed:
-            dropped = self._overtaken() if isinstance(request, Stop) else []
-            heappush(self._waiting, _Waiting(request.rank, next(self._numbers), request, ticket))
-            self._changed.notify()
-        for waiting in dropped:
-            self._answer(waiting, None, Refused("overtaken by a stop"), self.clock())
-
-    def __len__(self) -> int:
-        return len(self._waiting)
-
-    def end(self) -> None:
-        """Drops what waits; the thread ends after the request in flight."""
-        with self._changed:
-            self._waiting.clear()
-            self._closing = True
-            self._changed.notify()
-
-    def _overtaken(self) -> list[_Waiting]:
-        dropped = [waiting for waiting in self._waiting if waiting.rank is Rank.MOVE]
-        self._waiting = sorted(waiting for waiting in self._waiting if waiting.rank is not Rank.MOVE)
-        return dropped
-
-    def _in_vain(self, error: Away) -> None:
-        """The camera was lost while it turned: whoever waits learns it now, so that he who turns it asks for a stop."""
-        with self._changed:
-            dropped = [waiting for waiting in self._waiting if waiting.rank is not Rank.STOP]
-            self._waiting = sorted(waiting for waiting in self._waiting if waiting.rank is Rank.STOP)
-        for waiting in dropped:
-            self._answer(waiting, None, error, self.clock())
-
-    def _run(self) -> None:
-        while (waiting := self._next()) is not None:
-            sent = self.clock()
-            try:
-                result = self._send(waiting.request)
-            except DeviceError as error:
-                if isinstance(error, Away) and self.started:
-                    self._others_at = self.clock() + STOP_ALONE_S
-                    self.owing(True)
-                    self._in_vain(error)
-                elif isinstance(waiting.request, Stop):
-                    self.owing(False)  # it has arrived, whatever the camera thinks of it
-                self._answer(waiting, None, error, sent)
-            else:
-                self._answer(waiting, result, None, sent)
-        if self.started and stand_still(self.camera, self.clock):
-            self.turning(None)
-        self.owing(False)
-        self.camera.close()
-
-    def _next(self) -> _Waiting | None:
-        """The next request; while a lost camera is owed a stop, the pause between two stops is nobody else's."""
-        with self._changed:
-            while not self._closing or self._waiting:
-                pause = self._others_at - self.clock()
-                if self._waiting and (self._waiting[0].rank is Rank.STOP or pause <= 0):
-                    return heappop(self._waiting)
-                self._changed.wait(pause if self._waiting else None)
-            return None
-
-    def _send(self, request: Request) -> object:
-        if isinstance(request, Start | FIRMWARE):
-            self.started = True  # before it is sent: a start whose answer is lost may have been heard
-            self._drives, self._driven = isinstance(request, FIRMWARE) and not isinstance(request, TurnFor), None
-            self.turning(request.direction if isinstance(request, Start) else DRIVE)
-        result = self.camera.send(request)
-        if isinstance(request, Stop) or (isinstance(result, Reading) and self._has_driven(result)):
-            self.started = self._drives = False
-            self.turning(None)
-            self.owing(False)
-        elif isinstance(result, Reading) and not self._met and not self.started:
-            self.turning(None)  # whoever ends motions in our place may make itself known there too
-        self._met = self._met or isinstance(result, Reading)
-        return result
-
-    def _has_driven(self, reading: Reading) -> bool:
-        """Whether what the firmware drove by itself stands; nobody stops that."""
-        before, self._driven = self._driven, reading
-        return self._drives and before is not None and reading.moving is not True and same(before, reading)
-
-    def _answer(self, waiting: _Waiting, result: object, error: DeviceError | None, sent: float) -> None:
-        reply = Reply(waiting.request, waiting.ticket, result, error, sent, self.clock())
-        self.post(Message(REPLY, value=reply, received=reply.received))
-
-
-class Device:
-    """A Sender for a camera on the network; `turning` is told what turns, before it does (`watchdog.py`).
-
-    `owing` is told when the camera was lost while it turned, and when the stop that it is owed was confirmed.
-    """
-
-    def __init__(
-        self,
-        connect: Callable[[], Camera],
-        post: Post,
-        clock: Callable[[], float] = time.time,
-        turning: Turning = lambda direction: None,
-        owing: Callable[[bool], None] = lambda on: None,
-    ) -> None:
-        self.control = Lane("camera control", connect(), post, clock, turning, owing)
-        self.pictures = Lane("camera pictures", connect(), post, clock)
-
-    def submit(self, request: Request, ticket: int) -> None:
-        """Any thread; returns at once."""
-        lane = self.pictures if request.rank is Rank.PICTURE else self.control
-        lane.put(request, ticket)
+    def send(self, request: Request) -> object:
+        """Sends and waits for the answer; DeviceError when there is none or it is no."""
+        ...
 
     def close(self) -> None:
-        """Returns when the camera stands still and both threads have ended, or after `END_S`."""
-        for lane in (self.control, self.pictures):
-            lane.end()
-        self.control.thread.join(END_S)
-        self.pictures.thread.join(0.5)
-
-
-def stand_still(
-    camera: Camera,
-    clock: Callable[[], float],
-    limit_s: float = END_S,
-    *,
-    direction: Direction | Literal["drive"] | None = None,
-) -> bool:
-    """Sends a stop until it is confirmed and two readings are equal; whether that was so within the limit.
-
-    What the firmware drives by itself has no stop of its own everywhere: a slow start takes its place, once, which has.
-    """
-    end = clock() + limit_s
-    every, drives = False, direction == DRIVE
-    if direction == DRIVE:
-        direction = Direction.LEFT
-    while clock() < end:
-        try:
-            if drives:
-                camera.send(Start(Direction.LEFT))
-                drives = False
-            camera.send(Stop(every=every, direction=direction))
-            camera.send(Status())  # it may lag behind the motor
-            asked, before = clock(), camera.send(Status())
-            time.sleep(min(GAP_S, max(0.0, asked + GAP_S - clock())))
-            after = camera.send(Status())
-        except DeviceError as error:
-            log.warning("the stop at the end is not confirmed yet: %s", error)
-            time.sleep(0.2)
-            continue
-        if isinstance(before, Reading) and isinstance(after, Reading) and same(before, after):
-            return True
-        every = True
-    log.error("the camera may still be moving: no confirmed stop within %.0f s", limit_s)
-    return False
-
-
-def same(one: Reading, other: Reading, about: float = 0.0) -> bool:
-    """Whether two readings show a camera at rest (it repeats a value, or dithers by 0.1 degree).
-
-    `about`: so many degrees of pan and tilt do not count.
-    """
-    pan, tilt = abs((one.pan - other.pan + 180) % 360 - 180), abs(one.tilt - other.tilt)
-    return max(pan, tilt) < max(STILL_DEG, about) and abs(one.zoom - other.zoom) < STILL_DEG
+        """Ends the connection."""
+        ...

@@ -13,7 +13,7 @@ from typing import Any
 
 from services import __version__, topics
 from services.bus import Message
-from services.camera.requests import Identity
+from services.camera.device import Identity
 
 Key = tuple[str, str]  # platform, entity
 ENTITY_TOPICS = (topics.HOMEASSISTANT_ENTITY, topics.HOMEASSISTANT_STATUS)

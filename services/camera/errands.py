@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from services.camera.requests import Errand
+from services.camera.device import Errand
 
 
 @dataclass(frozen=True)

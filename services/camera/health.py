@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from services.camera.absence import Absence
-from services.camera.requests import Away, BadLogin, Locked, Reply, Status
+from services.camera.device import Away, BadLogin, Locked, Reply, Status
 from services.payloads import CameraStatus
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0  # between attempts to reach a camera that is away

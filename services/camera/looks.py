@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import cast
 
 from services.camera.commands import HideLens, VideoMode
+from services.camera.device import Mode, Picture, Refused, SetPicture
 from services.camera.errands import GetContrast, SetContrast, SetPrivacy
 from services.camera.plan import Plan, ask, attempt
-from services.camera.requests import Mode, Picture, Refused, SetPicture
 from services.camera.upkeep import Facts
 
 SCAN_CONTRAST = 80  # of 100: black squares on white paper stand out, and greys are not clipped yet

@@ -11,8 +11,8 @@ from typing import Any
 
 from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, CalibrateZoom, TakeLens
 from services.camera.commands import HideLens, PlaySound, RecordSound, VideoMode
+from services.camera.device import Direction, Refused, SetPicture
 from services.camera.places import name_of
-from services.camera.requests import Direction, Refused, SetPicture
 from services.camera.scan.wish import ScanFor
 from services.payloads import Who
 

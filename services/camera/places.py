@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from services import document
-from services.camera.requests import Reading, Refused
+from services.camera.device import Reading, Refused
 from services.errors import ConfigError, DeviceError
 from services.payloads import Place
 from services.payloads import Places as PlacesPayload

@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any, TypeVar, cast
 
-from services.camera.requests import Reply, Request
+from services.camera.device import Reply, Request
 from services.errors import DeviceError
 
 T = TypeVar("T")

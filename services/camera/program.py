@@ -13,7 +13,7 @@ from services.apartment import zoom_levels
 from services.camera.address import Address
 from services.camera.alarm.listener import Listener
 from services.camera.calibration.study import Studio
-from services.camera.device import Device
+from services.camera.lanes import Lanes
 from services.camera.places import Places
 from services.camera.scan.analysis import Pool
 from services.camera.scan.sightings import Eye
@@ -35,7 +35,7 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     with ExitStack() as stack:  # what was opened last is closed first: nobody gives an order while the motors are ended
         channel = stack.enter_context(closing(Channel(config.name, config.stream, address, config.kind, post, gate)))
         watchdog = stack.enter_context(closing(Watchdog(config.brand, address)))
-        device = Device(connector(config.brand, address, gate), post, turning=watchdog.tell, owing=gate.owe)
+        device = Lanes(connector(config.brand, address, gate), post, turning=watchdog.tell, owing=gate.owe)
         made_sound = getattr(brand(config.brand), "sound", None)
         desk = Desk(device, made_sound(address, gate) if made_sound else None, post)
         sender = stack.enter_context(closing(Studio(desk, post)))

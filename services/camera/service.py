@@ -20,16 +20,16 @@ from services.camera.calibration.calibrator import Calibrator
 from services.camera.capabilities import Abilities
 from services.camera.chores import WITHOUT_CAMERA, Chores
 from services.camera.commands import VideoMode
-from services.camera.device import REPLY, Sender
+from services.camera.device import GetPicture, Identify, Identity, Picture, Rank, Reading, Refused, Reply, Status
 from services.camera.discovery import ENTITY_TOPICS, Discovery
 from services.camera.early import Early
 from services.camera.health import Health
+from services.camera.lanes import REPLY, Sender
 from services.camera.orders import Command, GotoPlace, LookAt
 from services.camera.places import Places
 from services.camera.plan import Plan, Run, Stage, attempt, wait
 from services.camera.ptz.motors import Motors
 from services.camera.ptz.trips import Trips
-from services.camera.requests import GetPicture, Identify, Identity, Picture, Rank, Reading, Refused, Reply, Status
 from services.camera.scan.analysis import ANALYSED, Analysed, Analyst
 from services.camera.scan.scanner import Scanner
 from services.camera.scan.sightings import Eye

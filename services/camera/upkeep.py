@@ -11,9 +11,9 @@ from collections.abc import Callable
 from datetime import datetime, timedelta
 from zoneinfo import ZoneInfo
 
+from services.camera.device import Errand, GetPicture, Picture, Refused, Reply
 from services.camera.errands import GetClock, GetContrast, GetPrivacy, GetStorage, SetClock, Storage
 from services.camera.plan import Plan, attempt, wait
-from services.camera.requests import Errand, GetPicture, Picture, Refused, Reply
 from services.camera.settings import ClockSettings
 
 LOOK_S = 2.0  # between two looks whether something is due: it waits while the camera moves

@@ -22,8 +22,8 @@ from typing import Literal, Protocol, cast
 from pydantic import SecretStr
 
 from services.camera.address import Address
-from services.camera.device import DRIVE, stand_still
-from services.camera.requests import Camera, Direction, Status
+from services.camera.device import Camera, Direction, Status
+from services.camera.lanes import DRIVE, stand_still
 from services.camera.web.gate import Gate
 from services.errors import DeviceError
 

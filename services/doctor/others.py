@@ -10,9 +10,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import urlsplit
 
+from services.camera.device import BadLogin, Locked
 from services.camera.probe import login
 from services.camera.probe.wire import Wire
-from services.camera.requests import BadLogin, Locked
 from services.doctor.findings import Finding, ill, well
 from services.errors import ConfigError, DeviceError, Unavailable
 from services.storage import Address, upkeep

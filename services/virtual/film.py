@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import floor
 
-from services.camera.requests import StreamAddress
+from services.camera.device import StreamAddress
 from services.camera.scan.footage import Footage, Glimpse, Visit
 from services.camera.video import pictures
 from services.camera.video.likeness import Likeness

@@ -1,4 +1,4 @@
-"""A camera's Sender in virtual time: what `camera/device.py` does with threads, done by a queue and due times."""
+"""A camera's Sender in virtual time: what `camera/lanes.py` does with threads, done by a queue and due times."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from dataclasses import replace
 
 from services.bus import Message
 from services.camera.brands.amcrest import Amcrest
-from services.camera.device import REPLY
-from services.camera.requests import Rank, Refused, Reply, Request
+from services.camera.device import Rank, Refused, Reply, Request
+from services.camera.lanes import REPLY
 from services.errors import DeviceError
 from services.runner import Post
 from services.virtual.wire import Wire
@@ -77,7 +77,7 @@ class Link:
         return min(lane.due for lane in self._lanes)
 
     def submit(self, request: Request, ticket: int) -> None:
-        """See `camera.device.Sender`."""
+        """See `camera.lanes.Sender`."""
         self._lanes[request.rank is Rank.PICTURE].put(request, ticket)
 
     def deliver(self, now: float) -> None:

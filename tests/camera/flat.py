@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from services.bus import Message
-from services.camera.device import REPLY
-from services.camera.requests import (
+from services.camera.device import (
     Errand,
     GetPicture,
     Identify,
@@ -29,6 +28,7 @@ from services.camera.requests import (
     Start,
     Stop,
 )
+from services.camera.lanes import REPLY
 from services.camera.scan.analysis import ANALYSED, Analysed, Task
 from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService

@@ -17,12 +17,12 @@ from pydantic import SecretStr
 from services.camera.address import Address
 from services.camera.brands.amcrest import Amcrest
 from services.camera.capabilities import Capabilities, GetCapabilities
+from services.camera.device import Reading, Reply, Request, Status
 from services.camera.plan import Plan, Run, Stage
 from services.camera.ptz.calibrate import calibrate
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import Arrival, goto
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Reading, Reply, Request, Status
 from services.camera.web.gate import Gate
 from services.errors import DeviceError
 from services.simulators.camera.device import Device

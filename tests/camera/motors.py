@@ -12,9 +12,7 @@ from dataclasses import dataclass, field
 from math import atan, degrees
 from typing import Any, Literal
 
-from services.camera.plan import Plan, Run, Stage
-from services.camera.ptz.skill import RelativeForm
-from services.camera.requests import (
+from services.camera.device import (
     Direction,
     GotoPreset,
     MoveOver,
@@ -28,6 +26,8 @@ from services.camera.requests import (
     Stop,
     TurnFor,
 )
+from services.camera.plan import Plan, Run, Stage
+from services.camera.ptz.skill import RelativeForm
 from services.errors import DeviceError
 
 PAN = (1.0, 3.0, 6.0, 10.0, 16.0, 24.0, 34.0, 45.0)

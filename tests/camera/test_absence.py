@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from services.camera.requests import Away
+from services.camera.device import Away
 from services.payloads import seconds as seconds_of
 from tests.camera.flat import Flat
 

@@ -11,7 +11,7 @@ from pydantic import SecretStr
 
 from services.camera.address import Address
 from services.camera.brands import amcrest
-from services.camera.requests import (
+from services.camera.device import (
     Away,
     BadLogin,
     Direction,

@@ -18,8 +18,7 @@ from pydantic import SecretStr
 from services.camera import brands
 from services.camera.address import Address
 from services.camera.capabilities import Capabilities, GetCapabilities
-from services.camera.device import same
-from services.camera.requests import (
+from services.camera.device import (
     Away,
     BadLogin,
     Camera,
@@ -37,6 +36,7 @@ from services.camera.requests import (
     Status,
     Stop,
 )
+from services.camera.lanes import same
 from services.camera.settings import Config
 from services.camera.watchdog import connector
 from services.camera.web.gate import Gate

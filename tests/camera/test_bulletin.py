@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from services.camera.bulletin import Bulletin
+from services.camera.device import Reading
 from services.camera.health import Health
 from services.camera.places import Places
-from services.camera.requests import Reading
 from services.payloads import Position
 from tests.camera.flat import Flat
 from tests.camera.goals import random_goals

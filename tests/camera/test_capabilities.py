@@ -11,8 +11,8 @@ import pytest
 
 from services.camera.brands.dahua import capabilities as dahua
 from services.camera.capabilities import PARTS, Abilities, Capabilities, GetCapabilities, joined
+from services.camera.device import Away, Identity, Refused, Reply
 from services.camera.plan import Until
-from services.camera.requests import Away, Identity, Refused, Reply
 from services.errors import DeviceError
 from tests.camera.bench import bench, simulator
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from services.camera.brands.dahua import events
 from services.camera.brands.dahua.events import Parser
-from services.camera.requests import Event
+from services.camera.device import Event
 
 START, STOP = Event("VideoMotion", "Start"), Event("VideoMotion", "Stop")
 BEAT = Event("", "Heartbeat")

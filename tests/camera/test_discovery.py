@@ -13,8 +13,8 @@ from pydantic import BaseModel
 from services import topics
 from services.bus import Message
 from services.camera import orders
+from services.camera.device import Identity
 from services.camera.discovery import Discovery, entities
-from services.camera.requests import Identity
 from services.payloads import CameraStatus, Diagnostic, Motion, Position, ScanState, Stream
 from tests.camera.flat import Flat
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import SecretStr
 
-from services.camera.requests import Away, BadLogin, Locked
+from services.camera.device import Away, BadLogin, Locked
 from services.camera.web.digest import Login
 from services.camera.web.gate import LONGEST_RETRY_S, RETRY_S, Book, Gate
 from services.errors import DeviceError

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from services.camera.alarm.listener import Heard
 from services.camera.alarm.motion import MotionWatch
+from services.camera.device import Away, Event, Refused, Reply, Request
 from services.camera.errands import GetMotion
 from services.camera.plan import Plan, Run, Stage
-from services.camera.requests import Away, Event, Refused, Reply, Request
 from services.errors import DeviceError
 
 START, STOP, BEAT = Event("VideoMotion", "Start"), Event("VideoMotion", "Stop"), Event("", "Heartbeat")

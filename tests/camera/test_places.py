@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from services.camera.device import Reading, Refused
 from services.camera.places import MOST, Places, name_of
-from services.camera.requests import Reading, Refused
 from services.errors import ConfigError, DeviceError
 from services.payloads import Place
 

@@ -27,13 +27,7 @@ from services.camera.brands import amcrest
 from services.camera.brands.dahua import ptz
 from services.camera.brands.dahua.events import Parser
 from services.camera.capabilities import PARTS, Capabilities, GetCapabilities
-from services.camera.errands import GetClock, GetContrast, GetMotion, GetPrivacy, GetStorage, Storage
-from services.camera.probe import anonymous, likeness, paper, show
-from services.camera.probe.contact import MOVES, READS, contact
-from services.camera.probe.findings import Findings
-from services.camera.probe.stream import read_events
-from services.camera.probe.wire import Wire
-from services.camera.requests import (
+from services.camera.device import (
     Away,
     BadLogin,
     Direction,
@@ -49,6 +43,12 @@ from services.camera.requests import (
     Status,
     Stop,
 )
+from services.camera.errands import GetClock, GetContrast, GetMotion, GetPrivacy, GetStorage, Storage
+from services.camera.probe import anonymous, likeness, paper, show
+from services.camera.probe.contact import MOVES, READS, contact
+from services.camera.probe.findings import Findings
+from services.camera.probe.stream import read_events
+from services.camera.probe.wire import Wire
 from services.camera.web.gate import Gate
 from services.config import load
 from services.peers import free_port, wait_until

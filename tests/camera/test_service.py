@@ -11,7 +11,7 @@ import pytest
 from services import payloads
 from services.bus import Message
 from services.camera.capabilities import Capabilities, GetCapabilities
-from services.camera.requests import Away, BadLogin, Direction, MoveOver, MoveTo, Start, Status, Stop
+from services.camera.device import Away, BadLogin, Direction, MoveOver, MoveTo, Start, Status, Stop
 from services.errors import BadMessage
 from services.topics import read
 from tests.camera.flat import Flat

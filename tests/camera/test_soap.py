@@ -15,7 +15,7 @@ from pydantic import SecretStr
 
 from services.camera.address import Address
 from services.camera.brands.onvif import Onvif, Profile, position, read_reading
-from services.camera.requests import Away, BadLogin, Locked, Reading, Refused, Status
+from services.camera.device import Away, BadLogin, Locked, Reading, Refused, Status
 from services.camera.web.gate import Gate
 from services.camera.web.soap import FIRST, Soap, envelope, read_envelope, token
 

@@ -14,9 +14,9 @@ from pydantic import SecretStr
 from services.bus import Message
 from services.camera.address import Address
 from services.camera.commands import PlaySound
+from services.camera.device import Away, BadLogin, Refused, Reply, Request, Status
 from services.camera.errands import EndRecording, Play, Record, Recorded
 from services.camera.plan import Run, Stage
-from services.camera.requests import Away, BadLogin, Refused, Reply, Request, Status
 from services.camera.sound import g711, wav
 from services.camera.sound.desk import Desk
 from services.camera.sound.takes import Takes

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from services.camera.brands.dahua import errands as dahua
+from services.camera.device import Away, Errand, Refused
 from services.camera.errands import (
     GetClock,
     GetContrast,
@@ -20,7 +21,6 @@ from services.camera.errands import (
     SetPrivacy,
     Storage,
 )
-from services.camera.requests import Away, Errand, Refused
 from services.camera.upkeep import drift, local
 from services.errors import DeviceError
 from tests.camera.flat import Flat

@@ -13,7 +13,7 @@ from math import ceil
 import cv2
 import numpy as np
 
-from services.camera.requests import Reading
+from services.camera.device import Reading
 from services.camera.scan.sightings import Eye, Sighting
 from services.simulators.camera.view import prints
 from services.simulators.camera.view.optics import Window, project, window

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from services.bus import Message
-from services.camera.requests import Away, BadLogin, Event
+from services.camera.device import Away, BadLogin, Event
 from services.camera.web.endless import Silent
 from services.errors import DeviceError
 from services.runner import Post

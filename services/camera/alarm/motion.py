@@ -16,9 +16,9 @@ from collections.abc import Callable
 from typing import Literal
 
 from services.camera.alarm.listener import Heard
+from services.camera.device import Event, Reply
 from services.camera.errands import GetMotion
 from services.camera.plan import Plan, attempt
-from services.camera.requests import Event, Reply
 from services.camera.upkeep import Facts
 from services.payloads import Motion, stamp
 

@@ -7,7 +7,7 @@ import httpx
 from services.camera.address import Address
 from services.camera.alarm.listener import Ear
 from services.camera.brands.dahua import errands, picture, ptz, replies, streams, system
-from services.camera.requests import (
+from services.camera.device import (
     Away,
     Camera,
     ClearPreset,
@@ -63,7 +63,7 @@ class Amcrest:
         self.http.close()
 
     def send(self, request: Request) -> object:
-        """One request of ours, mostly one of the camera's; DeviceError as in `requests.py`."""
+        """One request of ours, mostly one of the camera's; DeviceError as in `device.py`."""
         match request:
             case Start():
                 return self._start(request)

@@ -17,10 +17,10 @@ from xml.sax.saxutils import escape
 
 import httpx
 
-from services.camera import requests
+from services.camera import device
 from services.camera.address import Address
 from services.camera.capabilities import Capabilities, GetCapabilities
-from services.camera.requests import Away, Camera, Identity, Reading, Refused, Start, StreamAddress
+from services.camera.device import Away, Camera, Identity, Reading, Refused, Start, StreamAddress
 from services.camera.web.connection import SNAPSHOT, connection, fetch
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
@@ -65,36 +65,36 @@ class Onvif:
         """Ends the connection."""
         self.http.close()
 
-    def send(self, request: requests.Request) -> object:
-        """One request of ours, mostly one of the camera's; DeviceError as in `requests.py`."""
+    def send(self, request: device.Request) -> object:
+        """One request of ours, mostly one of the camera's; DeviceError as in `device.py`."""
         match request:
             case Start():
                 return self._command("ContinuousMove", f"{velocity(request)}{_token('Timeout', f'PT{ITSELF_S}S')}")
-            case requests.TurnFor(right, down, zoom, seconds):
+            case device.TurnFor(right, down, zoom, seconds):
                 speeds = vector("Velocity", right / 100, -down / 100, zoom / 100)
                 return self._command("ContinuousMove", speeds + _token("Timeout", f"PT{seconds:.2f}S"))
-            case requests.MoveTo(pan, tilt, zoom, form="PositionABS"):
+            case device.MoveTo(pan, tilt, zoom, form="PositionABS"):
                 where = position(Reading(pan, tilt, zoom), self._known_profile(), self.address)
                 return self._command("AbsoluteMove", vector("Position", *where))
-            case requests.Stop():
+            case device.Stop():
                 return self._command("Stop", "<PanTilt>true</PanTilt><Zoom>true</Zoom>")
-            case requests.Status():
+            case device.Status():
                 return read_reading(self._ptz("GetStatus"), self._known_profile(), self.address)
-            case requests.GotoPreset(number):
+            case device.GotoPreset(number):
                 return self._command("GotoPreset", _token("PresetToken", self._preset(number)))
-            case requests.SavePreset(number):
+            case device.SavePreset(number):
                 return self._save(number)
-            case requests.ClearPreset(number):
+            case device.ClearPreset(number):
                 return self._clear(number)
-            case requests.Snapshot():
+            case device.Snapshot():
                 return self._snapshot()
-            case requests.FindStream():
+            case device.FindStream():
                 return self._stream()
-            case requests.Identify():
+            case device.Identify():
                 return self._identify()
             case GetCapabilities("motors"):
                 return read_capabilities(self._node())
-            case requests.Reboot():
+            case device.Reboot():
                 self._ask(DEVICE, "SystemReboot")
                 return None
             case _:

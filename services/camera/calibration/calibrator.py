@@ -24,10 +24,10 @@ from services.camera.calibration.shots import How, compared, taken
 from services.camera.calibration.study import study
 from services.camera.calibration.wishes import CalibrateLens, CalibrateMount, CalibrateZoom, TakeLens
 from services.camera.calibration.zoom import Climb
+from services.camera.device import GetPicture, Refused
 from services.camera.plan import Plan, attempt, wait
 from services.camera.ptz.trips import Trips
 from services.camera.ptz.zooming import widest
-from services.camera.requests import GetPicture, Refused
 from services.camera.scan.scanner import Scanner
 from services.camera.settings import Config
 from services.errors import DeviceError

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from services import document
-from services.camera.requests import Refused
+from services.camera.device import Refused
 from services.vision.lens import COEFFICIENTS, Lens
 from services.whole_file import write_whole
 

@@ -14,8 +14,8 @@ import numpy as np
 from services.camera.calibration.shots import BoardShot, How, board_in, taken
 from services.camera.calibration.study import study
 from services.camera.calibration.wishes import CalibrateLens
+from services.camera.device import Away, Refused, Status
 from services.camera.plan import Plan, attempt, wait
-from services.camera.requests import Away, Refused, Status
 from services.vision.calibrate_lens import Fit, doubt_px, fit
 from services.vision.coverage import Album
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from services.camera.calibration.shots import How, MarkerShot, markers_in, taken
 from services.camera.calibration.study import study
+from services.camera.device import Away, Reading, Refused
 from services.camera.plan import Plan, wait
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
-from services.camera.requests import Away, Reading, Refused
 from services.vision.aim import readings_at
 from services.vision.calibrate_mount import FEWEST, MountFit, best_pose, fit
 from services.vision.frames import Array, Mount, camera_in_apartment

@@ -9,8 +9,8 @@ from typing import cast
 import numpy as np
 
 from services.camera.calibration.study import study
+from services.camera.device import Picture, Snapshot
 from services.camera.plan import Plan, ask, attempt, wait
-from services.camera.requests import Picture, Snapshot
 from services.camera.video import pictures
 from services.vision.board import Board, Seen, find
 from services.vision.calibrate_lens import Array

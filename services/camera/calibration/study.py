@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import TypeVar, cast
 
 from services.bus import Message
-from services.camera.device import REPLY, Sender
+from services.camera.device import Errand, Rank, Refused, Reply, Request
+from services.camera.lanes import REPLY, Sender
 from services.camera.plan import Plan, ask
-from services.camera.requests import Errand, Rank, Refused, Reply, Request
 from services.errors import DeviceError
 from services.runner import Post
 

@@ -10,13 +10,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import sqrt
 
+from services.camera.device import Away, Reading, Refused
 from services.camera.plan import Plan
 from services.camera.ptz.goal import Goal, Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.zooming import widest
-from services.camera.requests import Away, Reading, Refused
 from services.vision.zoom import WIDEST, Level, Magnification
 
 STEPS = 4  # between the narrowest and the widest: the status of these cameras tells five levels apart

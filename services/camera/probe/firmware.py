@@ -10,9 +10,9 @@ from typing import Any
 from services.camera.brands.dahua import errands, ptz, system
 from services.camera.brands.dahua.capabilities import EVENTS, status_form
 from services.camera.brands.dahua.replies import read_table
+from services.camera.device import Refused
 from services.camera.probe.findings import Findings, share
 from services.camera.probe.wire import PICTURE, Exchange, Wire
-from services.camera.requests import Refused
 
 CONFIG = "/cgi-bin/configManager.cgi?action=getConfig&name="
 NARROW = "VideoInOptions[0]"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from services.camera.device import Refused
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import ODD_S, Exchange, Wire
-from services.camera.requests import Refused
 from services.camera.web.digest import Challenge, read_challenge, says_stale
 
 TARGET = "/cgi-bin/magicBox.cgi?action=getDeviceType"

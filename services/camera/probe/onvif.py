@@ -9,10 +9,10 @@ from typing import cast
 
 from services.camera.address import Address
 from services.camera.capabilities import Capabilities, GetCapabilities
+from services.camera.device import BadLogin, Camera, Identify, Identity, Reading, Snapshot, Status
 from services.camera.probe import firmware
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
-from services.camera.requests import BadLogin, Camera, Identify, Identity, Reading, Snapshot, Status
 from services.camera.watchdog import connector
 from services.camera.web.gate import Gate
 

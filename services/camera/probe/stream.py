@@ -9,9 +9,9 @@ from typing import Any
 
 import httpx
 
+from services.camera.device import Away
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
-from services.camera.requests import Away
 
 ATTACH = "/cgi-bin/eventManager.cgi?action=attach&codes=[VideoMotion]&heartbeat=1"
 ENCODED = ATTACH.replace("[", "%5B").replace("]", "%5D")

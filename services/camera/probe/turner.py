@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from services.camera.brands.dahua import ptz
 from services.camera.brands.dahua.replies import read_table
+from services.camera.device import Away, Direction, Reading, Refused, Start
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Exchange, NoRight, Wire
-from services.camera.requests import Away, Direction, Reading, Refused, Start
 
 STILL_DEG = 0.15  # readings nearer than this are the same
 REST_S = 20.0

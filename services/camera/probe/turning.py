@@ -9,10 +9,10 @@ from math import hypot, sqrt
 from statistics import fmean, median
 
 from services.camera.brands.dahua import ptz
+from services.camera.device import Direction, MoveOver, MoveTo, Reading
 from services.camera.probe.findings import Findings, Speed
 from services.camera.probe.turner import STILL_DEG, Run, Sample, Turner, apart, difference, moving
 from services.camera.probe.wire import Exchange, Wire
-from services.camera.requests import Direction, MoveOver, MoveTo, Reading
 
 LEVELS = (1, 3, 5)  # the middle one of a full table; the fastest would swing far
 SHORT_S, LONG_S = 0.4, 1.2

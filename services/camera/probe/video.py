@@ -11,9 +11,9 @@ from typing import Literal
 from services.camera.address import Address
 from services.camera.brands.dahua import streams
 from services.camera.brands.dahua.replies import read_table
+from services.camera.device import BadLogin, Refused
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
-from services.camera.requests import BadLogin, Refused
 from services.camera.video import rtsp
 from services.camera.web.gate import Gate
 from services.errors import DeviceError

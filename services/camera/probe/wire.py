@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import httpx
 from pydantic import SecretStr
 
-from services.camera.requests import Away, BadLogin, Locked, Refused
+from services.camera.device import Away, BadLogin, Locked, Refused
 from services.camera.web.digest import Challenge, authorization, read_challenge
 
 ANSWER = httpx.Timeout(8.0, connect=3.0)

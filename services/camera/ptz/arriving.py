@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from math import sqrt
 from typing import cast
 
-from services.camera.device import same
+from services.camera.device import Reading, Reply, Status
+from services.camera.lanes import same
 from services.camera.plan import Plan, wait
 from services.camera.ptz import zoom_drive
 from services.camera.ptz.course import FOREVER, PAN, TILT, ZOOM
@@ -17,7 +18,6 @@ from services.camera.ptz.helm import PAIR_S, Helm
 from services.camera.ptz.landing import RESTED_S
 from services.camera.ptz.pace import READ_LATE, Pace
 from services.camera.ptz.skill import NEARER_DEG, THERE_DEG
-from services.camera.requests import Reading, Reply, Status
 
 FEW = 3  # commands left
 LOOKS = 30  # less and less often

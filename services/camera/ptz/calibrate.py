@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import cast
 
+from services.camera.device import Reading, Status
 from services.camera.plan import Plan, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Goal, Limits
@@ -22,7 +23,6 @@ from services.camera.ptz.pace import READ_LATE
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.zoom_sweeps import sweep
-from services.camera.requests import Reading, Status
 
 NAMES = ("pan", "tilt", "zoom")
 LEG_S, ROOM = 1.5, 0.3  # each leg turns so long, and through so much of the way to the end stop at most

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from math import hypot
 
+from services.camera.device import Reading, Reply
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import STOP_LATE, Seen, Told
 from services.camera.ptz.skill import ZOOM_SLOWS_S, Skill
-from services.camera.requests import Reading, Reply
 
 PAN, TILT, ZOOM = range(3)
 END = 0.15  # degrees or levels: as near as that to an end of its range, an axis may have been stopped by it

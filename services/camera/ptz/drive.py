@@ -11,13 +11,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from services.camera.device import GotoPreset, MoveTo, Reply
 from services.camera.ptz import zoom_drive
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import Seen, Told
 from services.camera.ptz.skill import Skill
-from services.camera.requests import GotoPreset, MoveTo, Reply
 
 ABSOLUTE: tuple[Literal["PositionABS", "moveAbsolutely"], ...] = ("PositionABS", "moveAbsolutely")
 PRESET_DEG = 2.0  # a preset as near to the goal as that is worth going to

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import cast
 
+from services.camera.device import Reading, Refused, Request, Status
 from services.camera.plan import Plan, wait
 from services.camera.ptz import drive as own
 from services.camera.ptz.arriving import Arriving
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.helm import Helm
-from services.camera.requests import Reading, Refused, Request, Status
 
 MOST_DRIVES = 4  # in one move
 TRY_LEFT = 7  # commands; with fewer nothing new is tried

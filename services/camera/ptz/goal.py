@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from services.camera.requests import Reading, Refused
+from services.camera.device import Reading, Refused
 
 Pose = tuple[float, float, float]  # unwrapped pan and tilt in degrees, zoom in levels
 EDGE_DEG = 0.2  # goals keep this far from a stop, so that nothing pushes against it

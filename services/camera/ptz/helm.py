@@ -6,7 +6,8 @@ from dataclasses import replace
 from math import hypot
 from typing import cast
 
-from services.camera.device import same
+from services.camera.device import Direction, Reading, Reply, Request, Start, Status
+from services.camera.lanes import same
 from services.camera.plan import Plan, ask, wait
 from services.camera.ptz.course import FOREVER, PAN, TILT, ZOOM, Course
 from services.camera.ptz.goal import EDGE_DEG, Goal, Limits, Pose
@@ -14,7 +15,6 @@ from services.camera.ptz.pace import ACT_PART, HALF_CHANGE, READ_LATE, READ_PART
 from services.camera.ptz.skill import LATE_PART, Skill
 from services.camera.ptz.stand import LOST
 from services.camera.ptz.stand import stop as until_confirmed
-from services.camera.requests import Direction, Reading, Reply, Request, Start, Status
 
 NEAR_LEVELS = 0.5
 END_LEVELS = 0.3  # zoom ends so far from the ends of its range

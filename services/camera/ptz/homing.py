@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from services.camera.device import Reading, Refused
 from services.camera.plan import Plan, wait
 from services.camera.ptz import drive as own
 from services.camera.ptz.course import PAN, TILT, ZOOM
@@ -18,7 +19,6 @@ from services.camera.ptz.ladder import Ladder
 from services.camera.ptz.leg import Leg, Part
 from services.camera.ptz.outlook import Way
 from services.camera.ptz.skill import AGAIN_PART, LATE_PART
-from services.camera.requests import Reading, Refused
 
 ALONG = 1.0
 BACK_DEG = 10.0  # it goes no farther behind its goal

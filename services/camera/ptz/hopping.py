@@ -14,6 +14,7 @@ from dataclasses import replace
 from math import copysign, hypot
 from typing import cast
 
+from services.camera.device import MoveOver, Reading, Refused, Reply, Status
 from services.camera.plan import Plan, wait
 from services.camera.ptz import landing, scale, zoom_drive
 from services.camera.ptz.arriving import Arriving
@@ -26,7 +27,6 @@ from services.camera.ptz.planes import Planes, Scale
 from services.camera.ptz.rush import rush
 from services.camera.ptz.scale import Hop, Turned
 from services.camera.ptz.skill import RelativeForm
-from services.camera.requests import MoveOver, Reading, Refused, Reply, Status
 
 MOST = 6  # hops without a rest
 TURNS = 4  # of them in one move

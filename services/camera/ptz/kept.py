@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from services.camera.device import Identity
 from services.camera.ptz.pace import Pace
 from services.camera.ptz.planes import Planes
 from services.camera.ptz.skill import KEEP, ZOOM_UNSURE, Honours, RelativeForm, Sense, Skill
 from services.camera.ptz.zoom_rate import Fit, ZoomRate
-from services.camera.requests import Identity
 from services.whole_file import write_whole
 
 Pair = tuple[float, float]

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from math import hypot, sqrt
 from typing import Literal, cast
 
+from services.camera.device import Reading, Reply
 from services.camera.ptz import scale, zoom_drive
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
@@ -22,7 +23,6 @@ from services.camera.ptz.pace import HALF_CHANGE, READ_LATE, READ_PART
 from services.camera.ptz.planes import Scale
 from services.camera.ptz.scale import Hop
 from services.camera.ptz.skill import NEAR_DEG, RelativeForm, Skill
-from services.camera.requests import Reading, Reply
 
 # When to look.
 LEFT_DEG = (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, the most that tells enough

@@ -13,12 +13,12 @@ from typing import Any
 
 from services.camera import orders
 from services.camera.answers import Answers, Job
+from services.camera.device import Reading, Refused, Reply
 from services.camera.orders import Command, MoveBy
 from services.camera.plan import Plan, Run, Stage
 from services.camera.ptz.move import Arrival
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import Hold, halt, stop
-from services.camera.requests import Reading, Refused, Reply
 from services.camera.scan.wish import ScanFor
 from services.payloads import OrderState
 from services.topic import lateness

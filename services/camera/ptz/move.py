@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import cast
 
+from services.camera.device import Reading, Status
 from services.camera.plan import Plan, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.driving import Driving
@@ -25,7 +26,6 @@ from services.camera.ptz.skill import DITHER_DEG, Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.turning import Turning
 from services.camera.ptz.zooming import Zooming
-from services.camera.requests import Reading, Status
 from services.errors import DeviceError
 
 MOST_LEGS = 30  # the deadline ends most moves that do not come to an end

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from typing import cast
 
+from services.camera.device import Reading, Status
 from services.camera.plan import Plan, wait
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.pace import Pace
 from services.camera.ptz.skill import AGAIN_PART
-from services.camera.requests import Reading, Status
 
 FEARED = 1.0  # of the doubt about a rate, where a stop is near
 MOST_HOPS = 4  # are left, although zoom has to wait for them

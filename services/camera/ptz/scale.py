@@ -8,12 +8,12 @@ from math import hypot, sqrt
 
 import numpy as np
 
+from services.camera.device import Reading
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import EDGE_DEG, Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told, Vector
 from services.camera.ptz.planes import Planes, Scale
 from services.camera.ptz.skill import LEVEL, RelativeForm, Skill
-from services.camera.requests import Reading
 
 STAYED_DEG = 0.3
 FAR_DEG = 3.0  # a shorter way is no measure for how far off it ended

@@ -11,10 +11,10 @@ from math import hypot
 from statistics import median
 from typing import Literal
 
+from services.camera.device import Reply
 from services.camera.ptz.pace import HALF_CHANGE, PAN_RATES, READ_LATE, TILT_RATES, ZOOM_RATES, Pace
 from services.camera.ptz.planes import POINT, TURN, VIEW, Scale, scale_of
 from services.camera.ptz.zoom_rate import ZoomRate
-from services.camera.requests import Reply
 
 RelativeForm = Literal["moveRelatively", "Position"]
 Honours = Literal["unknown", "no", "pan", "yes"]  # of a way to let the firmware drive; pan: it ignores tilt

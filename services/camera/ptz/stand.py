@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import cast
 
-from services.camera.device import GAP_S, same
+from services.camera.device import BadLogin, Direction, Locked, Reading, Refused, Reply, Start, Status, Stop, TurnFor
+from services.camera.lanes import GAP_S, same
 from services.camera.plan import Plan, ask, attempt, wait
 from services.camera.ptz.skill import Skill
-from services.camera.requests import BadLogin, Direction, Locked, Reading, Refused, Reply, Start, Status, Stop, TurnFor
 from services.errors import DeviceError
 
 LOST = 4  # readings after a stop that are unlike the one before: it is not slowing down, the stop had no effect

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from services.camera.bulletin import Bulletin
 from services.camera.capabilities import Abilities
+from services.camera.device import Identity, Picture
 from services.camera.orders import GotoPlace, LookAt
 from services.camera.places import Places
 from services.camera.plan import Plan
@@ -15,7 +16,6 @@ from services.camera.ptz.goal import Goal, Pose
 from services.camera.ptz.kept import Kept
 from services.camera.ptz.move import Arrival, goto
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Identity, Picture
 from services.camera.settings import Config
 
 

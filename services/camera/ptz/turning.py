@@ -9,13 +9,13 @@ from dataclasses import replace
 from math import inf
 from typing import cast
 
+from services.camera.device import Reading, Refused, Status
 from services.camera.plan import Plan, wait
 from services.camera.ptz.course import PAN, TILT
 from services.camera.ptz.helm import Helm, levels_of, sign
 from services.camera.ptz.leg import DANGER, Leg, choose
 from services.camera.ptz.outlook import BLIND_S, Way
 from services.camera.ptz.zooming import Zooming
-from services.camera.requests import Reading, Refused, Status
 
 STOPS, STOPS_COMMANDS = 3.0, 2  # answers that a stop and a look at rest take; and commands
 RUNGS = 5  # legs without a rest between them

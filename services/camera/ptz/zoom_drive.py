@@ -9,11 +9,11 @@ from dataclasses import replace
 from math import hypot, inf
 from typing import cast
 
+from services.camera.device import Reading, Reply
 from services.camera.ptz.course import PAN, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.pace import READ_LATE, READ_PART, Seen, Told
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Reading, Reply
 
 SLOWER = 0.01  # it may last longer than that, for all that is known
 SURE = 0.4  # of its rate may be in doubt

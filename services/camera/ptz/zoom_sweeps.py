@@ -11,6 +11,7 @@ from typing import cast
 
 import numpy as np
 
+from services.camera.device import Direction, MoveOver, Reading, Reply, Request, Start, Status
 from services.camera.plan import Plan, ask, wait
 from services.camera.ptz import drive
 from services.camera.ptz.course import END, PAN, TILT, ZOOM
@@ -20,7 +21,6 @@ from services.camera.ptz.scale import zooms
 from services.camera.ptz.skill import OTHER_PART, Skill
 from services.camera.ptz.stand import settle, stop
 from services.camera.ptz.zoom_rate import ZoomRate
-from services.camera.requests import Direction, MoveOver, Reading, Reply, Request, Start, Status
 
 SWEEPS = 15  # from end to end
 LOOKS = 20  # at one of them

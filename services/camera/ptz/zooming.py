@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from typing import cast
 
+from services.camera.device import Direction, Reading, Start, Status
 from services.camera.plan import Plan, ask, wait
 from services.camera.ptz.course import FOREVER, ZOOM
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.helm import NEAR_LEVELS, Helm, sign
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.stand import stop
-from services.camera.requests import Direction, Reading, Start, Status
 
 WIDE_LEVELS, HELD_S = 0.05, 0.2
 BEYOND = 0.8  # of what is near enough may be gone beyond the goal

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from services.bus import Message
-from services.camera.requests import Away
+from services.camera.device import Away
 from services.camera.video import pictures
 from services.runner import Post
 from services.vision.detect import Detection

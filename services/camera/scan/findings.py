@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from services.camera.requests import Reading
+from services.camera.device import Reading
 from services.camera.scan.analysis import Analysed
 from services.camera.scan.sightings import Sighting, between
 from services.camera.scan.source import Spot

@@ -11,7 +11,7 @@ from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 
-from services.camera.requests import Away, StreamAddress
+from services.camera.device import Away, StreamAddress
 from services.camera.scan.footage import Footage, Glimpse, Visit
 from services.camera.video import pictures
 from services.camera.video.channel import Channel

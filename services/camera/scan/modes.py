@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import cast, get_args
 
+from services.camera.device import Away, GetPicture, Mode, Picture, Refused, Reply, SetPicture
 from services.camera.errands import GetContrast, SetContrast
 from services.camera.looks import SCAN_CONTRAST
 from services.camera.plan import Plan, ask, attempt
-from services.camera.requests import Away, GetPicture, Mode, Picture, Refused, Reply, SetPicture
 
 log = logging.getLogger(__name__)
 

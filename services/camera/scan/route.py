@@ -12,11 +12,11 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from services.camera.device import Reading
 from services.camera.ptz.drive import longest
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, Pace
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Reading
 from services.payloads import Place
 
 EXACT = 12  # up to this many places the order is the best there is; found in a tenth of a second

@@ -13,10 +13,10 @@ from uuid import uuid4
 from services import topics
 from services.bus import Message
 from services.camera.bulletin import Bulletin
+from services.camera.device import Away, Picture, Refused
 from services.camera.places import Places
 from services.camera.plan import Plan, wait
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Away, Picture, Refused
 from services.camera.scan import sightings
 from services.camera.scan.album import Album
 from services.camera.scan.analysis import Analysed, Analyst, Task

@@ -11,12 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, cast
 
+from services.camera.device import Away, GetPicture, Picture, Reading, Refused, Stop
 from services.camera.plan import Plan, attempt, wait
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.zooming import widest
-from services.camera.requests import Away, GetPicture, Picture, Reading, Refused, Stop
 from services.camera.scan.findings import Findings, Frame
 from services.camera.scan.modes import Modes
 from services.camera.scan.route import detours

@@ -11,7 +11,7 @@ from math import acos, atan, atan2, cos, degrees, hypot, radians, sin
 
 import numpy as np
 
-from services.camera.requests import Reading
+from services.camera.device import Reading
 from services.payloads import Point, Quaternion, ScanResult, WeightedQuaternion, stamp
 from services.vision.detect import Detection
 from services.vision.frames import Array, Kind, Mount, axes_in_apartment, camera_in_apartment, quaternion

@@ -9,11 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar, cast
 
-from services.camera.device import same
-from services.camera.plan import Plan, ask, attempt, wait
-from services.camera.ptz.course import PAN
-from services.camera.ptz.skill import Skill
-from services.camera.requests import (
+from services.camera.device import (
     FindStream,
     GotoPreset,
     MoveOver,
@@ -27,6 +23,10 @@ from services.camera.requests import (
     Stop,
     StreamAddress,
 )
+from services.camera.lanes import same
+from services.camera.plan import Plan, ask, attempt, wait
+from services.camera.ptz.course import PAN
+from services.camera.ptz.skill import Skill
 from services.camera.scan.footage import Footage, Visit
 
 TRIES = 3  # of a snapshot: the camera sometimes closes without an answer

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Protocol
 
 from services.bus import Message
-from services.camera.device import REPLY, Sender
+from services.camera.device import Refused, Reply, Request
 from services.camera.errands import EndRecording, Play, Record, Recorded
-from services.camera.requests import Refused, Reply, Request
+from services.camera.lanes import REPLY, Sender
 from services.camera.sound import g711, wav
 from services.errors import DeviceError
 from services.runner import Post

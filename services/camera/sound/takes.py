@@ -13,9 +13,9 @@ from typing import cast
 from services import topics
 from services.bus import Message
 from services.camera.commands import PlaySound, RecordSound
+from services.camera.device import Refused
 from services.camera.errands import EndRecording, Play, Record, Recorded
 from services.camera.plan import Plan, ask
-from services.camera.requests import Refused
 from services.payloads import Audio
 
 

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 from services.bus import Message
 from services.camera.address import Address
-from services.camera.requests import StreamAddress
+from services.camera.device import StreamAddress
 from services.camera.video import pictures
 from services.camera.video.newest import Newest, Upright
 from services.camera.video.proxy import Proxy

@@ -11,9 +11,9 @@ from contextlib import suppress
 
 from services.bus import Message
 from services.camera import orders
+from services.camera.device import Away, FindStream, Picture, Refused, Reply, Snapshot, StreamAddress
 from services.camera.health import Health
 from services.camera.plan import Plan, attempt, wait
-from services.camera.requests import Away, FindStream, Picture, Refused, Reply, Snapshot, StreamAddress
 from services.camera.settings import Config
 from services.camera.upkeep import Facts
 from services.camera.video import pictures

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from threading import Condition, Lock
 from typing import Literal, NamedTuple
 
-from services.camera.requests import Away
+from services.camera.device import Away
 from services.camera.video import pictures
 from services.camera.video.pictures import Image
 from services.camera.video.timing import Exposure

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from services.camera.requests import Away
+from services.camera.device import Away
 
 Image = NDArray[np.uint8]
 QUALITY = 80  # of the JPEGs that we make

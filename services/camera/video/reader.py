@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from threading import Condition, Thread
 
-from services.camera.requests import BadLogin
+from services.camera.device import BadLogin
 from services.camera.video.newest import Newest
 from services.camera.video.session import Arrival, Session
 from services.camera.video.timing import Exposure, StreamClock

@@ -16,7 +16,7 @@ import av.logging
 import numpy as np
 
 from services.camera.address import Address
-from services.camera.requests import Away, BadLogin, Refused
+from services.camera.device import Away, BadLogin, Refused
 from services.camera.video.pictures import Image
 from services.camera.video.session import Arrival
 from services.camera.video.timing import Held

@@ -9,7 +9,7 @@ import logging
 from collections.abc import Callable
 from typing import TypeVar, cast
 
-from services.camera.requests import Reply
+from services.camera.device import Reply
 from services.camera.upkeep import Facts
 from services.errors import DeviceError
 

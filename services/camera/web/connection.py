@@ -5,7 +5,7 @@ from __future__ import annotations
 import httpx
 
 from services.camera.address import Address
-from services.camera.requests import Away
+from services.camera.device import Away
 from services.camera.web.digest import Login
 
 COMMAND = httpx.Timeout(6.0, connect=2.0)

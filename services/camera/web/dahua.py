@@ -13,7 +13,7 @@ import httpx
 
 from services.camera.address import Address
 from services.camera.brands.dahua import events, replies, system
-from services.camera.requests import Away, Event, Refused
+from services.camera.device import Away, Event, Refused
 from services.camera.sound import g711
 from services.camera.web.connection import connection, fetch, lost, respelt
 from services.camera.web.digest import Login, header, read_challenge

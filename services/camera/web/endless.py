@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 
 from services.camera.address import Address
-from services.camera.requests import Away
+from services.camera.device import Away
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
 

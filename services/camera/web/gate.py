@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal
 
-from services.camera.requests import Away, BadLogin, Locked
+from services.camera.device import Away, BadLogin, Locked
 from services.errors import DeviceError
 
 MOST_FAILURES = 3

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import httpx
 
 from services.camera.address import Address
-from services.camera.requests import Away, BadLogin
+from services.camera.device import Away, BadLogin
 from services.camera.video import pictures
 from services.camera.video.session import Arrival
 from services.camera.web.connection import connection

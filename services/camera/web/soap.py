@@ -18,7 +18,7 @@ from xml.sax.saxutils import escape
 import httpx
 
 from services.camera.address import Address
-from services.camera.requests import Away, BadLogin, Locked, Refused
+from services.camera.device import Away, BadLogin, Locked, Refused
 from services.camera.web.connection import lost
 from services.camera.web.gate import ODD_S, Gate
 

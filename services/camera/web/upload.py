@@ -14,7 +14,7 @@ import time
 from http.client import HTTPConnection, HTTPException, HTTPSConnection
 from urllib.parse import urlsplit
 
-from services.camera.requests import Away, Refused
+from services.camera.device import Away, Refused
 from services.camera.web.gate import Gate
 
 LENGTH = 9_999_999  # what clients announce that these cameras are known to take

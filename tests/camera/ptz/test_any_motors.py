@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from services.camera.device import Identity, MoveTo, Reply, Start, Status
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.kept import Kept
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.zoom_rate import ZoomRate
-from services.camera.requests import Identity, MoveTo, Reply, Start, Status
 from tests.camera.motors import Motors, drive
 
 LIMITS = Limits()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from services.camera.requests import Start, TurnFor
+from services.camera.device import Start, TurnFor
 from tests.camera.flat import Flat
 from tests.camera.motors import Motors
 

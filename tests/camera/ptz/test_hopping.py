@@ -9,6 +9,7 @@ from typing import Literal
 
 import pytest
 
+from services.camera.device import MoveOver, Reading, Reply, Request, Start, Status
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.helm import Helm
@@ -17,7 +18,6 @@ from services.camera.ptz.move import goto
 from services.camera.ptz.planes import POINT, TURN, VIEW, Law
 from services.camera.ptz.scale import Hop, learn, zooms
 from services.camera.ptz.skill import RelativeForm, Skill
-from services.camera.requests import MoveOver, Reading, Reply, Request, Start, Status
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.track import Moment, Rail, go
 from tests import bounds

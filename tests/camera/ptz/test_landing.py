@@ -7,12 +7,12 @@ from math import hypot, isfinite
 
 import pytest
 
+from services.camera.device import Reading, Reply, Status
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
 from services.camera.ptz.landing import Doubts, End, at_end, doubts, ends, foretell, judge, read, sight
 from services.camera.ptz.scale import Hop
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Reading, Reply, Status
 
 WAY = Glide(began=0.0, place=10.0, speed=0.0, goal=40.0, top=45.0, acceleration=90.0, answered=0.0)
 KNOWN = Doubts(goal=0.2, place=0.0, read=0.06, time=0.005, change=0.02)

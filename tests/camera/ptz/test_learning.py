@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from services.camera.device import Direction, MoveTo, Reading, Reply, Start, Status
 from services.camera.ptz.course import PAN, READ_DEG, ZOOM, Course
 from services.camera.ptz.drive import Drive, judge
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.pace import PAN_RATES, READ_LATE, TILT_RATES, Pace, Seen, Told, taught
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Direction, MoveTo, Reading, Reply, Start, Status
 from tests.camera.motors import Motors, drive
 
 LIMITS = Limits()

@@ -7,10 +7,10 @@ from statistics import median
 
 import pytest
 
+from services.camera.device import Reading, Refused, Start
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Reading, Refused, Start
 from tests.camera.motors import Motors, drive
 
 LIMITS = Limits()

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from services.camera.device import Reply, Request, Start, Status
 from services.camera.ptz.outlook import BLIND_S
-from services.camera.requests import Reply, Request, Start, Status
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.latency import TAIL
 from tests.camera.goals import Goal, Outcome, Rig, random_goals

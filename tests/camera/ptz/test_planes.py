@@ -9,10 +9,10 @@ from statistics import median
 
 import pytest
 
+from services.camera.device import Identity
 from services.camera.ptz.kept import Kept
 from services.camera.ptz.planes import LEVELS, POINT, TURN, Planes
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Identity
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.latency import TAIL
 from services.simulators.camera.motors import magnification

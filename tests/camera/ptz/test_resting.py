@@ -10,12 +10,12 @@ from typing import cast
 
 import pytest
 
+from services.camera.device import MoveTo, Reading, Reply, Request, Status
 from services.camera.ptz.arriving import Arriving
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.helm import Helm
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.zoom_rate import ZoomRate
-from services.camera.requests import MoveTo, Reading, Reply, Request, Status
 from services.simulators.camera.firmwares import PROFILES
 from tests import bounds
 from tests.camera.goals import LIMITS, Goal, Outcome, Rig, random_goals

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from services.camera.device import Reply, Request, Start, Status, Stop
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
 from services.camera.ptz.zooming import widest
-from services.camera.requests import Reply, Request, Start, Status, Stop
 from services.simulators.camera.firmwares import PROFILES
 from tests.camera.goals import Rig
 from tests.camera.motors import Motors, drive

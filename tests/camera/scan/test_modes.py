@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from services.camera.device import Away, GetPicture, Picture, Refused, Reply, Request, SetPicture
 from services.camera.errands import GetContrast, SetContrast
 from services.camera.plan import Plan, Stage
-from services.camera.requests import Away, GetPicture, Picture, Refused, Reply, Request, SetPicture
 from services.camera.scan.modes import Modes
 from services.errors import DeviceError
 

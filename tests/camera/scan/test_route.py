@@ -7,9 +7,9 @@ from itertools import pairwise, permutations
 
 import pytest
 
+from services.camera.device import Reading
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.skill import Skill
-from services.camera.requests import Reading
 from services.camera.scan.route import detours, hop_s, shortest
 from services.payloads import Place
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.camera.requests import Reading
+from services.camera.device import Reading
 from services.camera.scan.sightings import Eye, Sighting, Sought, results
 from services.camera.settings import MarkerSizes
 from services.payloads import ScanResult

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from services.bus import Message
+from services.camera.device import Away, Picture, Reply, Snapshot
 from services.camera.health import Health
 from services.camera.plan import Until
-from services.camera.requests import Away, Picture, Reply, Snapshot
 from services.camera.settings import Config
 from services.camera.upkeep import Facts
 from services.camera.video import pictures

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from services.camera.requests import Away, BadLogin
+from services.camera.device import Away, BadLogin
 from services.camera.video.newest import Newest, Upright
 from services.camera.video.reader import Reader
 from services.camera.video.session import Arrival, Session

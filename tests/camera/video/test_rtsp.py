@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from services.camera.requests import Away, BadLogin, DeviceError
+from services.camera.device import Away, BadLogin, DeviceError
 from services.camera.video.newest import Frame, Newest, Upright
 from services.camera.video.reader import Reader
 from services.camera.video.rtsp import Rtsp, with_password

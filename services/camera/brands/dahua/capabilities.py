@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator
 from services.camera.brands.dahua import picture, ptz
 from services.camera.brands.dahua.replies import read_table
 from services.camera.capabilities import Capabilities, Part
-from services.camera.requests import Away, Refused
+from services.camera.device import Away, Refused
 
 Dialogue = Generator[str, str, object]  # as in `errands`
 

@@ -12,6 +12,7 @@ from datetime import datetime
 from services.camera.brands.dahua import capabilities, events, picture
 from services.camera.brands.dahua.replies import is_ok, read_table
 from services.camera.capabilities import GetCapabilities
+from services.camera.device import Away, Errand, Refused
 from services.camera.errands import (
     GetClock,
     GetContrast,
@@ -23,7 +24,6 @@ from services.camera.errands import (
     SetPrivacy,
     Storage,
 )
-from services.camera.requests import Away, Errand, Refused
 
 Dialogue = Generator[str, str, object]  # yields request targets, is sent the bodies of good answers
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 
-from services.camera.requests import Event
+from services.camera.device import Event
 
 MOST = 256 * 1024  # bytes without a boundary: no event is so long
 MOTION = "VideoMotion"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from services.camera.brands.dahua.replies import read_table
-from services.camera.requests import Mode, Picture, Refused, SetPicture
+from services.camera.device import Mode, Picture, Refused, SetPicture
 
 MODES: dict[Mode, int] = {"color": 0, "auto": 1, "bw": 2}
 PICTURE_TABLE = "/cgi-bin/configManager.cgi?action=getConfig&name=VideoInOptions"

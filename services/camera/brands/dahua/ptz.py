@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from services.camera.brands.dahua.replies import read_table
-from services.camera.requests import Away, Direction, MoveOver, MoveTo, Reading, Start, TurnFor
+from services.camera.device import Away, Direction, MoveOver, MoveTo, Reading, Start, TurnFor
 
 CODES = {
     Direction.LEFT: "Left",

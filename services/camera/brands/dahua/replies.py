@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import httpx
 
-from services.camera.requests import Away, Locked, Refused
+from services.camera.device import Away, Locked, Refused
 
 
 def read_table(body: str) -> dict[str, str]:

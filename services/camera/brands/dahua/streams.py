@@ -7,7 +7,7 @@ from typing import Literal
 import httpx
 
 from services.camera.address import Address
-from services.camera.requests import StreamAddress
+from services.camera.device import StreamAddress
 
 SUBTYPES = {"main": 0, "sub": 1}
 MJPEG = "/cgi-bin/mjpg/video.cgi?channel=1&subtype=1"  # firmware since 2016 has it of the sub stream only

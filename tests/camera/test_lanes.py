@@ -8,8 +8,7 @@ import threading
 import pytest
 
 from services.bus import Message
-from services.camera.device import DRIVE, Device, stand_still
-from services.camera.requests import (
+from services.camera.device import (
     Away,
     Direction,
     GotoPreset,
@@ -22,6 +21,7 @@ from services.camera.requests import (
     Status,
     Stop,
 )
+from services.camera.lanes import DRIVE, Lanes, stand_still
 
 WAIT_S = 5.0
 
@@ -50,10 +50,10 @@ class Slow:
         pass
 
 
-def device(*cameras: Slow) -> tuple[Device, queue.Queue[Message]]:
+def device(*cameras: Slow) -> tuple[Lanes, queue.Queue[Message]]:
     inbox: queue.Queue[Message] = queue.Queue()
     each = iter(cameras)
-    return Device(lambda: next(each), inbox.put), inbox
+    return Lanes(lambda: next(each), inbox.put), inbox
 
 
 def reply(inbox: queue.Queue[Message]) -> Reply:
@@ -114,7 +114,7 @@ def test_a_camera_that_is_lost_while_it_turns_is_owed_a_stop_until_one_has_arriv
     control, pictures, owed = Slow(deaf=1), Slow(), queue.Queue[bool]()
     each = iter((control, pictures))
     inbox: queue.Queue[Message] = queue.Queue()
-    sender = Device(lambda: next(each), inbox.put, owing=owed.put)
+    sender = Lanes(lambda: next(each), inbox.put, owing=owed.put)
     control.leave.set()
     sender.submit(Start(Direction.LEFT), 1)
     assert reply(inbox).error is None
@@ -168,7 +168,7 @@ def test_the_watchdog_hears_of_a_drive_and_of_its_end() -> None:
     control, pictures = Slow(), Slow()
     inbox: queue.Queue[Message] = queue.Queue()
     each = iter((control, pictures))
-    sender = Device(lambda: next(each), inbox.put, turning=told.append)
+    sender = Lanes(lambda: next(each), inbox.put, turning=told.append)
     control.leave.set()
     for ticket, request in enumerate((GotoPreset(3), Status(), Status(), Status())):
         sender.submit(request, ticket)
