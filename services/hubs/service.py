@@ -29,7 +29,7 @@ class Config(Section):
 
     homeassistant: bool = True  # discovery of the home's items; a camera has `discovery` of its own
     homie: bool = False  # the home as a device of Homie 4.0
-    home_service: str = Field(default="openhab", pattern=r"[a-z0-9_-]+")  # whose status says whether the home is there
+    home_service: str = Field(default="openhab", pattern=r"^[a-z0-9_-]+$")  # its status says whether the home is there
     home: Home
 
 

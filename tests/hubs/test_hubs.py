@@ -146,3 +146,9 @@ def test_what_homie_wants_becomes_a_command() -> None:
     nobody = HOMIE_SET.message("true", device="apartment", node="nobody", property="value")._replace(received=NOW)
     with pytest.raises(BadMessage, match="nobody"):
         list(service.handle(nobody, NOW))
+
+
+@pytest.mark.parametrize("service", ["openhab/status", "+", "Open HAB"])
+def test_the_service_behind_the_home_is_one_name_of_a_topic(service: str) -> None:
+    with pytest.raises(ValueError, match="home_service"):
+        hubs(home_service=service)
