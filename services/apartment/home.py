@@ -6,13 +6,14 @@ Everything that concerns an item comes from here: topics, persistence, bridge, s
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import Literal
 from zoneinfo import ZoneInfo
 
 from pydantic import Field, field_validator, model_validator
 
+from services.apartment import forms
 from services.section import Section
 from services.states import ITEM_TYPES, base_type
 
@@ -21,6 +22,7 @@ NOT_A_NAME = "expected a name of letters, digits and _ that does not begin with 
 GROUP_ROS = "ROS"  # the group whose members go to the robot, as in the report
 Strategy = Literal["everyChange", "everyUpdate", "restoreOnStartup"]  # when a state is stored, in OpenHAB's words
 Value = bool | int | float | str  # of a setting in OpenHAB's files
+Fault = tuple[tuple[str, ...], str]  # where (keys from the top of the file), and what is wrong
 
 
 class Range(Section):
@@ -166,21 +168,31 @@ class Home(Section):
         """The time zone of the wall clock."""
         return ZoneInfo(self.timezone)
 
-    def faults(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """What refers to nothing: where (keys from the top of the file), and what is wrong."""
+    def faults(self) -> Iterator[Fault]:
+        """What refers to nothing, and what OpenHAB's files cannot say: where, and what is wrong."""
         for name, thing in self.things.items():
             if thing.room is not None and thing.room not in self.rooms:
                 yield ("things", name, "room"), f"expected one of the rooms, got {thing.room!r}"
+            if thing.mqtt is not None:
+                yield from _told(("things", name, "mqtt", "availability"), forms.mqtt_filter(thing.mqtt.availability))
+            yield from _settings_faults(("things", name), thing.alexa, {})
         for name, group in self.groups.items():
-            if not re.fullmatch(NAME, name):
-                yield ("groups", name), NOT_A_NAME
-            for parent in group.groups if isinstance(group, Group) else ():
-                if parent not in self.groups and parent != GROUP_ROS:
-                    yield ("groups", name, "groups"), f"expected one of the groups, got {parent!r}"
+            yield from self._group_faults(name, group if isinstance(group, Group) else Group(label=group))
         for name, item in self.items.items():
             yield from self._item_faults(name, item)
+            yield from _form_faults(("items", name), item)
 
-    def _item_faults(self, name: str, item: Item) -> Iterator[tuple[tuple[str, ...], str]]:
+    def _group_faults(self, name: str, group: Group) -> Iterator[Fault]:
+        if not re.fullmatch(NAME, name):
+            yield ("groups", name), NOT_A_NAME
+        for parent in group.groups:
+            if parent not in self.groups and parent != GROUP_ROS:
+                yield ("groups", name, "groups"), f"expected one of the groups, got {parent!r}"
+        parts = [*(group.type.split(":") if group.type else []), *([group.function] if group.function else [])]
+        yield from _told(("groups", name), forms.group_state(parts, len(group.arguments)))
+        yield from _settings_faults(("groups", name), None, group.metadata)
+
+    def _item_faults(self, name: str, item: Item) -> Iterator[Fault]:
         if not re.fullmatch(NAME, name):
             yield ("items", name), NOT_A_NAME
         if name in self.groups or name == GROUP_ROS:
@@ -217,3 +229,35 @@ class Home(Section):
         if item.room is not None or item.thing is None:
             return item.room
         return self.things[item.thing].room
+
+
+def _form_faults(place: tuple[str, ...], item: Item) -> Iterator[Fault]:
+    """What of an item OpenHAB would not read."""
+    yield from _told((*place, "type"), forms.item_type(item.type))
+    if item.mqtt is not None:
+        yield from _topic_faults((*place, "mqtt"), item.mqtt)
+    for uid, settings in item.channels.items():
+        yield from _told((*place, "channels", uid), forms.channel(uid), *map(forms.key, settings))
+    if item.expire is not None:
+        yield from _told((*place, "expire"), forms.expire(item.expire))
+    yield from _settings_faults(place, item.alexa, item.metadata)
+
+
+def _topic_faults(place: tuple[str, ...], said: MqttTopics) -> Iterator[Fault]:
+    if said.state is None and said.command is None:
+        yield place, "expected a state or a command, got neither"
+    if said.state is not None:
+        yield from _told((*place, "state"), forms.mqtt_filter(said.state))
+    if said.command is not None:
+        yield from _told((*place, "command"), forms.mqtt_topic(said.command))
+
+
+def _settings_faults(place: tuple[str, ...], alexa: Alexa | None, others: dict[str, Metadata]) -> Iterator[Fault]:
+    if alexa is not None:
+        yield from _told((*place, "alexa", "settings"), *map(forms.key, alexa.settings))
+    for namespace, one in others.items():
+        yield from _told((*place, "metadata", namespace), forms.key(namespace), *map(forms.key, one.settings))
+
+
+def _told(place: tuple[str, ...], *found: str | None) -> Iterable[Fault]:
+    return ((place, text) for text in found if text is not None)

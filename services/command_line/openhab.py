@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -18,6 +19,7 @@ if TYPE_CHECKING:  # the grammars and HTTP, for these commands alone: every proc
     from services.openhab.site import Broker, BusDesign, Camera
 
 DESIGNS = ("dsl", "js", "links")
+SERVICE = re.compile(r"[a-z0-9]+")  # of OpenHAB's persistence: it becomes the name of a file
 app = typer.Typer(no_args_is_help=True, help="OpenHAB's files: write them, check them, make a home.yaml of them.")
 OpenHab = Annotated[str, typer.Option("--openhab", help="2.5, 3, 4, 5, or a release such as 4.2.")]
 
@@ -40,6 +42,8 @@ def generate_(
 
     if bus not in DESIGNS:
         raise ConfigError([f"--bus: expected one of {', '.join(DESIGNS)}, got {bus!r}"])
+    if not SERVICE.fullmatch(persistence):
+        raise ConfigError([f"--persistence: expected the name of a service such as jdbc, got {persistence!r}"])
     version = parse(openhab)
     apartment = load(config, ())
     known = folders.taken(out, version) if out.is_dir() else {}
@@ -48,6 +52,8 @@ def generate_(
         None if persistence == "none" else persistence, frozenset(known),
     )  # fmt: skip
     plan = folders.plan(out, files(site))
+    if wrong := folders.faults(plan, version):
+        raise ConfigError(wrong)
     if diff:
         typer.echo(folders.diff(plan), nl=False)
     else:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from services.errors import ConfigError
-from services.openhab.check import KINDS, read_site
+from services.openhab.check import KINDS, check, read_site
+from services.openhab.check.across import NOWHERE
 from services.openhab.generate import MARK
 from services.openhab.versions import Version
 from services.whole_file import write_whole
@@ -68,6 +69,27 @@ def diff(plan: Plan) -> str:
     return "".join(line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in parts)
 
 
+def faults(plan: Plan, version: Version) -> list[str]:
+    """What OpenHAB would not take of the files that are to be written, beside others' in the folder.
+
+    A link to a thing of OpenHAB's own pages is none: nobody sees those here.
+    """
+    ours = {path: text for path, text in plan.wanted.items() if path not in plan.foreign}
+    found = check({**_others(plan.folder), **ours}, version)
+    wrong = [one for one in found if one.severity == "error" and one.file in ours]
+    return [
+        f"{one.file}:{one.line}: {_head(ours[one.file], one.line)}: {one.text}"
+        for one in wrong
+        if not one.text.startswith(NOWHERE)
+    ]
+
+
+def _head(text: str, line: int) -> str:
+    """The first words of the item or thing that a line is part of, which say what it is called."""
+    above = [one for one in text.split("\n")[:line] if one and one[0] not in " })]"]
+    return " ".join(above[-1].split()[:2]) if above else "file"
+
+
 def apply(plan: Plan) -> None:
     """Writes; who reads meanwhile sees the old file or the new one, never a part."""
     for path in plan.written:
@@ -94,10 +116,15 @@ def texts(paths: Iterable[Path]) -> dict[str, str]:
     return found
 
 
+def _others(folder: Path) -> dict[str, str]:
+    """The texts of others' files."""
+    found = texts([folder]) if folder.is_dir() else {}
+    return {name: text for name, text in found.items() if MARK not in text.partition("\n")[0]}
+
+
 def taken(folder: Path, version: Version) -> dict[str, str]:
     """What others' files in the folder define already: names of items and UIDs of things, each with file and line."""
-    others = {name: text for name, text in texts([folder]).items() if MARK not in text.partition("\n")[0]}
-    site, _ = read_site(others, version)
+    site, _ = read_site(_others(folder), version)
     found: dict[str, str] = {}
     for items, findings in site.items:
         found |= {line.name: f"{findings.file}:{line.line}" for line in items.lines}

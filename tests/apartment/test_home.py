@@ -100,6 +100,45 @@ def test_what_refers_to_nothing_is_told_with_its_place(
     assert what in faults[0][1]
 
 
+MQTT = {"lamp": {"label": "Lamp", "kind": "mqtt"}}  # things
+
+
+@pytest.mark.parametrize(
+    ("changes", "where", "what"),
+    [
+        ({"items": {"A": item(type="Number:Powr")}}, ("items", "A", "type"), "'Powr'"),
+        ({"items": {"A": item(type="Switch:Foo")}}, ("items", "A", "type"), "Switch alone"),
+        ({"items": {"A": item(type="Number:Temperature:AVG")}}, ("items", "A", "type"), "Number:<dimension>"),
+        ({"groups": {"gLights": {"label": "x", "type": "Swich"}}}, ("groups", "gLights"), "'Swich'"),
+        ({"groups": {"gLights": {"label": "x", "function": "OR"}}}, ("groups", "gLights"), "type of the members"),
+        ({"groups": {"gLights": {"label": "x", "type": "Switch", "function": "OR"}}}, ("groups", "gLights"), "2 argum"),
+        ({"groups": {"gLights": {"label": "x", "metadata": {"my ns": {}}}}},
+         ("groups", "gLights", "metadata", "my ns"), "'my ns'"),
+        ({"things": MQTT, "items": {"A": item(thing="lamp", mqtt={})}}, ("items", "A", "mqtt"), "neither"),
+        ({"things": MQTT, "items": {"A": item(thing="lamp", mqtt={"command": "dev/+/set"})}},
+         ("items", "A", "mqtt", "command"), "dev/+/set"),
+        ({"things": MQTT, "items": {"A": item(thing="lamp", mqtt={"state": "dev/#/x"})}},
+         ("items", "A", "mqtt", "state"), "dev/#/x"),
+        ({"things": MQTT, "items": {"A": item(thing="lamp", mqtt={"state": "a\nuser b"})}},
+         ("items", "A", "mqtt", "state"), "one line"),
+        ({"things": {"lamp": {**MQTT["lamp"], "mqtt": {"availability": "a+"}}}},
+         ("things", "lamp", "mqtt", "availability"), "'a+'"),
+        ({"items": {"A": item(channels={"not a uid": {}})}}, ("items", "A", "channels", "not a uid"), "UID"),
+        ({"items": {"A": item(channels={"a:b:c:d": {"a b": 1}})}}, ("items", "A", "channels", "a:b:c:d"), "'a b'"),
+        ({"items": {"A": item(metadata={"my ns": {}})}}, ("items", "A", "metadata", "my ns"), "'my ns'"),
+        ({"items": {"A": item(metadata={"ns": {"settings": {"a b": 1}}})}}, ("items", "A", "metadata", "ns"), "'a b'"),
+        ({"items": {"A": item(alexa={"settings": {"a b": 1}})}}, ("items", "A", "alexa", "settings"), "'a b'"),
+        ({"items": {"A": item(expire="soon")}}, ("items", "A", "expire"), "'soon'"),
+    ],
+)  # fmt: skip
+def test_what_openhab_would_not_read_is_told_with_its_place(
+    changes: dict[str, Any], where: tuple[str, ...], what: str
+) -> None:
+    ((place, text),) = home(**changes).faults()
+    assert place == where
+    assert what in text
+
+
 def test_all_faults_are_told_at_once() -> None:
     items = {"A": item(thing="x", room="y", groups=["z"]), "2": item(thing="w")}
     assert [place for place, _ in home(items=items).faults()] == [

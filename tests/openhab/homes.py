@@ -8,6 +8,7 @@ from typing import Any
 import yaml
 from hypothesis import strategies as st
 
+from services.apartment import forms
 from services.apartment.home import Home
 from services.openhab.site import Camera
 
@@ -81,10 +82,7 @@ def items(draw: st.DrawFn, rooms: list[str], things: list[str], groups: list[str
     fields["ga"] = draw(st.sampled_from([None, "Light"]))
     fields["expire"] = draw(st.sampled_from([None, "5m", "2d,UNDEF"]))
     fields["tags"] = draw(st.sampled_from([None, [], ["Point", 'a "tag"']]))
-    topics = {
-        "state": draw(words.filter(bool)).replace("+", "").replace("#", "").replace("\0", "") or "a",
-        "on": draw(words),
-    }
+    topics = {"state": forms.CONTROL.sub("", draw(words)).replace("+", "").replace("#", "") or "a", "on": draw(words)}
     fields["mqtt"] = draw(st.sampled_from([None, topics]))
     fields["channels"] = draw(
         st.sampled_from([{}, {"zwave:device:c:node2:switch": {}}, {"a:b:c:d#e-f": {"profile": "follow", "x": -1.5}}])

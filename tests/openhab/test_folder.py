@@ -79,6 +79,45 @@ def test_an_item_of_others_is_left_out_of_ours_and_told(config: Path, tmp_path: 
     assert run("check", out)[0] == 0
 
 
+def spoil(config: Path, old: str, new: str) -> None:
+    """Changes one thing of home.yaml."""
+    home = config.parent / "home.yaml"
+    text = home.read_text(encoding="utf-8")
+    assert old in text
+    home.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("Number:Power", "Number:Powr", r"home\.yaml:\d+: items\.Kitchen_Plug_Power\.type: expected a dimension"),
+        ("alexa: {name: Kitchen}", "alexa: {device: Lihgt}",
+         r"^items/apartment\.items:\d+: Switch Kitchen_Light: expected a device type.*did you mean 'Light'"),
+    ],
+)  # fmt: skip
+def test_what_openhab_would_not_take_is_told_and_nothing_is_written(
+    config: Path, tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    out = tmp_path / "openhab"
+    generate(config, out)
+    before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+    spoil(config, old, new)
+    with pytest.raises(ConfigError, match=told):
+        generate(config, out)
+    assert {file: file.read_bytes() for file in out.rglob("*") if file.is_file()} == before
+
+
+def test_a_link_to_a_thing_of_openhabs_own_pages_is_written(config: Path, tmp_path: Path) -> None:
+    spoil(config, "zwave:device:controller:node2:switch_binary", "mqtt:topic:apartment:mine:lamp")
+    assert generate(config, tmp_path / "openhab")[0] == 0
+
+
+def test_nothing_is_written_outside_of_the_folder(config: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="--persistence: expected the name of a service"):
+        generate(config, tmp_path / "in" / "openhab", "--persistence", "../../escaped")
+    assert not list(tmp_path.rglob("escaped*"))
+
+
 def test_files_of_a_camera_that_went_are_removed(config: Path, tmp_path: Path) -> None:
     out = tmp_path / "openhab"
     generate(config, out)

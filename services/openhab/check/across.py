@@ -18,6 +18,8 @@ from services.openhab.check.sitemap import Shown
 from services.openhab.lines import ChannelLine, ItemLine, ThingLine
 from services.openhab.versions import Version
 
+NOWHERE = "expected a thing that exists"  # it may, in OpenHAB's own pages
+
 
 @dataclass
 class Site:
@@ -85,7 +87,7 @@ def _links(line: ItemLine, things: Mapping[str, ThingLine], findings: Findings) 
         here = Place(one.line, one.column)
         if thing is None:
             if one.value.startswith("mqtt:topic:") and any(uid.startswith("mqtt:topic:") for uid in things):
-                findings.error(here, f"expected a thing that exists, got the channel {one.value!r} of none")
+                findings.error(here, f"{NOWHERE}, got the channel {one.value!r} of none")
         elif channel is None and (thing.channels or thing.uid.startswith("mqtt:")):
             listed = ", ".join(own.id for own in thing.channels) or "none"
             findings.error(here, f"expected a channel of {thing.uid} ({listed}), got {one.value.rpartition(':')[2]!r}")

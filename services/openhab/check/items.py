@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 from lark import Token
 
+from services.apartment import forms
+from services.apartment.forms import FUNCTIONS, NEW_FUNCTIONS
 from services.apartment.home import NAME
 from services.openhab.check import patterns
 from services.openhab.check.findings import Findings, Place
-from services.openhab.check.items_grammar import FUNCTIONS, NEW_FUNCTIONS, grammar
+from services.openhab.check.items_grammar import grammar
 from services.openhab.check.reading import Node, below, name_of, text_of, tokens, tree
 from services.openhab.check.settings import settings_of
 from services.openhab.lines import ItemLine, Metadata
@@ -23,18 +25,7 @@ from services.openhab.readback import metadata_of, split_label
 from services.openhab.state_description import NAMESPACE
 from services.openhab.versions import Version
 from services.openhab.words import words
-from services.states import ITEM_TYPES
 
-DIMENSIONS = words(
-    "Acceleration AmountOfSubstance Angle Area ArealDensity CalorificValue CatalyticActivity Currency "
-    "DataAmount DataTransferRate Density Dimensionless ElectricCapacitance ElectricCharge ElectricConductance "
-    "ElectricConductivity ElectricCurrent ElectricInductance ElectricPotential ElectricResistance "
-    "EmissionIntensity Energy EnergyPrice Force Frequency Illuminance Intensity Length LuminousFlux "
-    "LuminousIntensity MagneticFlux MagneticFluxDensity Mass Power Pressure RadiantExposure "
-    "RadiationDoseAbsorbed RadiationDoseEffective RadiationSpecificActivity Radioactivity SolidAngle Speed "
-    "Temperature Time Volume VolumetricFlowRate"
-)
-ARGUMENTS = {"AND": 2, "OR": 2, "NAND": 2, "NOR": 2, "XOR": 2, "COUNT": 1}
 PROFILES = words(
     "default follow offset hysteresis range trigger-event-string timestamp-change timestamp-offset "
     "timestamp-trigger timestamp-update rawbutton-on-off-switch rawbutton-toggle-player "
@@ -111,7 +102,8 @@ def _check(line: ItemLine, version: Version, findings: Findings) -> None:
     if not re.fullmatch(NAME, line.name):
         findings.error(line, f"expected a name of letters, digits and _ that begins with no digit, got {line.name!r}")
     for fault in _type_faults(line, version):
-        findings.error(line, fault)
+        if fault:
+            findings.error(line, fault)
     _, shown = split_label(line.label or "")
     if (wrong := patterns.pattern(shown)) is not None:
         findings.error(line, wrong)
@@ -123,48 +115,26 @@ def _check(line: ItemLine, version: Version, findings: Findings) -> None:
         _check_metadata(line, one, version, findings)
 
 
-def _type_faults(line: ItemLine, version: Version) -> Iterator[str]:
+def _type_faults(line: ItemLine, version: Version) -> Iterator[str | None]:
     kind, *rest = line.type.split(":")
     if kind == "Group":
-        yield from _group_faults(line, rest, version)
-    elif kind not in ITEM_TYPES:
-        yield f"expected a type of item ({', '.join(ITEM_TYPES)} or Group), got {line.type!r}"
-    elif rest and (kind != "Number" or len(rest) > 1):
-        yield f"expected {kind}{':<dimension>' if kind == 'Number' else ' alone'}, got {line.type!r}"
-    elif rest and rest[0] not in DIMENSIONS:
-        yield f"expected a dimension such as Temperature, got {rest[0]!r}"
-    if kind != "Group" and line.arguments:
+        functions = (*FUNCTIONS, *(NEW_FUNCTIONS if version >= Version(4, 3) else ()))
+        yield forms.group_state(rest, len(line.arguments), functions)
+        return
+    yield forms.item_type(line.type)
+    if line.arguments:
         yield "expected arguments behind a group's function only"
-
-
-def _group_faults(line: ItemLine, rest: list[str], version: Version) -> Iterator[str]:
-    known = (*FUNCTIONS, *(NEW_FUNCTIONS if version >= (Version(4, 3)) else ()))
-    base, *more = rest or [""]
-    if base and base not in ITEM_TYPES:
-        yield f"expected the type of the members, got {base!r}"
-        return
-    if base == "Number" and more and more[0] not in known:
-        dimension = more.pop(0)
-        if dimension not in DIMENSIONS:
-            yield f"expected a dimension or a function ({', '.join(known)}), got {dimension!r}"
-            return
-    if more and (len(more) > 1 or more[0] not in known):
-        yield f"expected one of {', '.join(known)}, got {':'.join(more)!r}"
-        return
-    wanted = ARGUMENTS.get(more[0], 0) if more else 0
-    if len(line.arguments) != wanted:
-        yield f"expected {wanted} arguments of {more[0] if more else 'a group'}, got {len(line.arguments)}"
 
 
 def _check_metadata(line: ItemLine, one: Metadata, version: Version, findings: Findings) -> None:
     here = Place(one.line, one.column)
     faults: list[str | None] = [patterns.credentials(text) for text in _texts(one)]
     if one.namespace == "channel":
-        faults += [patterns.channel(one.value), _profile_fault(one)]
+        faults += [forms.channel(one.value), _profile_fault(one)]
     elif one.namespace == "autoupdate" and one.value not in ("true", "false"):
         faults.append(f"expected true or false, got {one.value!r}")
     elif one.namespace == "expire":
-        faults.append(patterns.expire(one.value, version))
+        faults.append(forms.expire(one.value, iso=version.major >= 4, wordy=version.major >= 5))
     elif one.namespace == "unit" and line.type.split(":")[0] not in ("Number", "Group"):
         faults.append(f"expected a unit for a Number only, got one for a {line.type}")
     elif one.namespace == NAMESPACE:
@@ -184,7 +154,7 @@ def _profile_fault(one: Metadata) -> str | None:
     if not isinstance(profile, str):
         return None if profile is None else f"expected the name of a profile, got {profile!r}"
     parts = profile.split(":")
-    if len(parts) > 2 or not all(patterns.SEGMENT.fullmatch(part) for part in parts):
+    if len(parts) > 2 or not all(forms.SEGMENT.fullmatch(part) for part in parts):
         return f"expected a profile such as follow or transform:MAP, got {profile!r}"
     near = difflib.get_close_matches(parts[-1], PROFILES, n=1, cutoff=0.8)
     if (len(parts) == 1 or parts[0] == "system") and parts[-1] not in PROFILES and near:

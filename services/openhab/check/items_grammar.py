@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from services.apartment.forms import FUNCTIONS, NEW_FUNCTIONS
 from services.openhab.check.reading import COMMENTS, STRICT_STRING
 from services.openhab.versions import Version
 
@@ -15,8 +16,6 @@ BASE = (
     "Switch", "Rollershutter", "String", "Dimmer", "Contact", "DateTime", "Color", "Player", "Location", "Call",
     "Image",
 )  # fmt: skip
-FUNCTIONS = ["EQUALITY", "AND", "OR", "NAND", "NOR", "AVG", "SUM", "MAX", "MIN", "COUNT", "LATEST", "EARLIEST"]
-NEW_FUNCTIONS = ("XOR", "MEDIAN")
 COMMON = r"""
 start: item*
 item: kind ID label? icon? groups? tags? bindings?

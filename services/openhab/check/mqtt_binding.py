@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 
-from services.openhab.check import patterns
+from services.apartment import forms
 from services.openhab.check.findings import Findings
 from services.openhab.lines import ChannelLine, Setting, ThingLine
 from services.openhab.versions import Version
@@ -86,7 +86,7 @@ def check(thing: ThingLine, version: Version, findings: Findings) -> None:
     elif thing.uid.startswith("mqtt:topic:"):
         _unknown(thing, thing.settings, THING, findings)
         topic = thing.settings.get("availabilityTopic")
-        if isinstance(topic, str) and (fault := patterns.mqtt_filter(topic)):
+        if isinstance(topic, str) and (fault := forms.mqtt_filter(topic)):
             findings.error(thing, fault)
         for channel in thing.channels:
             _check_channel(channel, findings)
@@ -122,7 +122,7 @@ def _check_channel(channel: ChannelLine, findings: Findings) -> None:
         findings.error(channel, "expected a stateTopic or a commandTopic, got neither")
     _topic(channel, "stateTopic", findings)
     command = channel.settings.get("commandTopic")
-    if isinstance(command, str) and (fault := patterns.mqtt_topic(command)):
+    if isinstance(command, str) and (fault := forms.mqtt_topic(command)):
         findings.error(channel, f"commandTopic: {fault}")
     if "qos" in channel.settings and str(channel.settings["qos"]) not in ("0", "1", "2"):
         findings.error(channel, f"expected 0, 1 or 2 for qos, got {channel.settings['qos']!r}")
@@ -138,7 +138,7 @@ def _topic(channel: ChannelLine, key: str, findings: Findings, *, needed: bool =
             findings.error(channel, f"expected {key} among the settings, got none")
     elif not isinstance(topic, str):
         findings.error(channel, f"expected a text for {key}, got {topic!r}")
-    elif fault := patterns.mqtt_filter(topic):
+    elif fault := forms.mqtt_filter(topic):
         findings.error(channel, f"{key}: {fault}")
 
 

@@ -1,6 +1,7 @@
-"""The small languages within texts: patterns, options, expiry, channel UIDs, cron, MQTT filters, addresses. Pure.
+"""The small languages within texts: patterns, options, cron, addresses. Pure.
 
-Each function says what is wrong with a text, or None.
+Each function says what is wrong with a text, or None. Not here: what a home is written in too, in
+`services/apartment/forms.py`.
 """
 
 from __future__ import annotations
@@ -8,19 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from services.openhab.versions import Version
-
 CONVERSION = re.compile(
     r"%(?:unit%|%|n|(?:\d+\$|<)?[-#+ 0,(]*\d*(?:\.\d+)?(?:[tT][HIklMSLNpzZsQBbhAaCYyjmdeRTrDFc]|[bBhHsScCdoxXeEfgGaA]))"
 )
 TRANSFORM = re.compile(r"[A-Z0-9]+\([^()]*\):(.*)", re.S)
-OLD_EXPIRE = re.compile(r"(?:(\d+)h)?\s*(?:(\d+)m)?\s*(?:(\d+)s)?", re.I)
-WORDY_EXPIRE = re.compile(
-    r"(?:\d+\s*(?:d|days?)\s*)?(?:\d+\s*(?:h|hrs?|hours?)\s*)?(?:\d+\s*(?:m|mins?|minutes?)\s*)?(?:\d+\s*(?:s|secs?|seconds?))?",
-    re.I,
-)
-ISO_EXPIRE = re.compile(r"P(?!$)(?:\d+D)?(?:T(?=\d)(?:\d+H)?(?:\d+M)?(?:\d+(?:\.\d+)?S)?)?")
-SEGMENT = re.compile(r"[A-Za-z0-9_-]+")
 CREDENTIALS = re.compile(r"[a-z][a-z0-9+.-]*://[^/\s\"'?#]*@", re.I)
 SECRET_PARAMETER = re.compile(r"[?&](?:password|passwd|pwd|pass|loginpas|token)=[^&\s]+", re.I)
 CRON_FIELDS = (
@@ -49,49 +41,6 @@ def options(text: str) -> str | None:
         state, equals, words = part.partition("=")
         if not state.strip() or (equals and not words.strip()):
             return f"expected options like state=words, got {part!r}"
-    return None
-
-
-def expire(text: str, version: Version) -> str | None:
-    """`5m`, `1h30m,UNDEF`, `10s,command=OFF`."""
-    duration, _, _what = text.partition(",")
-    duration = duration.strip()
-    short = bool(duration) and OLD_EXPIRE.fullmatch(duration) is not None
-    iso = version.major >= 4 and ISO_EXPIRE.fullmatch(duration) is not None
-    wordy = version.major >= 5 and bool(duration) and WORDY_EXPIRE.fullmatch(duration) is not None
-    if short or iso or wordy:
-        return None
-    forms = "such as 1h30m" + (" or PT1H30M" if version.major >= 4 else "") + (" or 1d" if version.major >= 5 else "")
-    return f"expected a time {forms}, got {duration!r}"
-
-
-def channel(text: str) -> str | None:
-    """`binding:type:thing:channel`, with `group#` before the channel's id where it has one."""
-    parts = text.split(":")
-    last, _, inner = parts[-1].partition("#")
-    if len(parts) < 4:
-        return f"expected a channel's UID, binding:type:thing:channel, got {text!r}"
-    wrong = [one for one in (*parts[:-1], last, *([inner] if "#" in parts[-1] else [])) if not SEGMENT.fullmatch(one)]
-    if wrong:
-        return f"expected letters, digits, _ and - between the colons of a UID, got {wrong[0]!r}"
-    return None
-
-
-def mqtt_filter(text: str) -> str | None:
-    """A topic that is listened to, perhaps with + and # for whole levels."""
-    levels = text.split("/")
-    if not text or "\0" in text:
-        return "expected a topic, got nothing"
-    for index, level in enumerate(levels):
-        if ("+" in level and level != "+") or ("#" in level and (level != "#" or index < len(levels) - 1)):
-            return f"expected + for a whole level and # for the last one, got {text!r}"
-    return None
-
-
-def mqtt_topic(text: str) -> str | None:
-    """A topic that is written to."""
-    if not text or "+" in text or "#" in text:
-        return f"expected a topic without + and #, got {text!r}"
     return None
 
 

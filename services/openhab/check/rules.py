@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from lark import Token
 
+from services.apartment import forms
 from services.openhab.check import patterns
 from services.openhab.check.findings import Findings, Place
 from services.openhab.check.items import Reference
@@ -207,7 +208,7 @@ def _channels(root: Node, findings: Findings) -> list[Reference]:
     for node in root.find_data("channel"):
         token = _first(node)
         uid = text_of(token, findings) if token.type == "STRING" else name_of(token)
-        if fault := patterns.channel(uid):
+        if fault := forms.channel(uid):
             findings.error(place(token), fault)
         found.append(Reference(uid, token.line or 1, token.column or 1))
     return found
