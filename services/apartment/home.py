@@ -140,9 +140,14 @@ class Item(Section):
         return text
 
     @property
+    def only_told(self) -> bool:
+        """Whether its state is all there is: it says so, or its device is given no topic of commands."""
+        return self.read_only or (self.mqtt is not None and self.mqtt.command is None and not self.channels)
+
+    @property
     def takes_commands(self) -> bool:
         """Whether a robot may command it at all."""
-        return not self.read_only and base_type(self.type) not in ("Contact", "Call", "Image")
+        return not self.only_told and base_type(self.type) not in ("Contact", "Call", "Image")
 
 
 class Home(Section):
@@ -174,6 +179,8 @@ class Home(Section):
             if thing.room is not None and thing.room not in self.rooms:
                 yield ("things", name, "room"), f"expected one of the rooms, got {thing.room!r}"
             if thing.mqtt is not None:
+                if thing.kind != "mqtt":
+                    yield ("things", name, "mqtt"), f"expected kind: mqtt beside it, got {thing.kind}"
                 yield from _told(("things", name, "mqtt", "availability"), forms.mqtt_filter(thing.mqtt.availability))
             yield from _settings_faults(("things", name), thing.alexa, {})
         for name, group in self.groups.items():
@@ -204,6 +211,10 @@ class Home(Section):
         for group in item.groups:
             if group not in self.groups and group != GROUP_ROS:
                 yield ("items", name, "groups"), f"expected one of the groups, got {group!r}"
+        device = self.things.get(item.thing or "")
+        if item.mqtt is not None and (device is None or device.kind != "mqtt"):
+            what = "none" if device is None else f"{item.thing!r} of kind {device.kind}"
+            yield ("items", name, "mqtt"), f"expected a thing of kind mqtt for it, got {what}"
 
     @cached_property
     def ros_items(self) -> dict[str, Item]:

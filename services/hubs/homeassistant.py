@@ -67,7 +67,7 @@ def _entity(item: Item) -> tuple[str, Fields]:
     if kind == "Contact":
         return "binary_sensor", {"payload_on": "OPEN", "payload_off": "CLOSED",
                                  "device_class": CONTACTS.get(item.icon or "", "opening")}  # fmt: skip
-    if kind == "Switch" and item.read_only:
+    if kind == "Switch" and item.only_told:
         return "binary_sensor", {"device_class": "motion"} if item.icon == "motion" else {}
     if kind in ("Image", "Call", "Location"):
         return "", {}

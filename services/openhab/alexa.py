@@ -47,7 +47,7 @@ def device(home: Home, name: str) -> str | None:
 def _single(item: Item) -> str | None:
     """The type of an item that is a device of its own."""
     kind, light = base_type(item.type), "light" in (item.icon or "")
-    if kind == "Switch" and item.read_only:
+    if kind == "Switch" and item.only_told:
         return "MotionSensor"
     if kind == "Dimmer" and item.icon == "soundvolume":
         return "Speaker"
@@ -57,7 +57,7 @@ def _single(item: Item) -> str | None:
     if kind in found:
         return found[kind]
     if item.type == "Number:Temperature":
-        return "TemperatureSensor" if item.read_only else "Other.TargetTemperature"
+        return "TemperatureSensor" if item.only_told else "Other.TargetTemperature"
     if item.icon == "humidity" and kind == "Number":
         return "Other.CurrentHumidity"
     return _generic(item, "Other.")
@@ -67,13 +67,13 @@ def _attribute(item: Item) -> str | None:
     """The attribute that an item is of its device."""
     kind = base_type(item.type)
     if kind == "Switch":
-        return "MotionDetectionState" if item.read_only else "PowerState"
+        return "MotionDetectionState" if item.only_told else "PowerState"
     if kind == "Dimmer":
         return "VolumeLevel" if item.icon == "soundvolume" else "PowerState,Brightness"
     if kind == "Rollershutter":
         return "PositionState"
     if item.type == "Number:Temperature":
-        return "CurrentTemperature" if item.read_only else "TargetTemperature"
+        return "CurrentTemperature" if item.only_told else "TargetTemperature"
     if item.icon == "humidity" and kind == "Number":
         return "CurrentHumidity"
     if kind == "String" and len(heating_modes(item.options)) > 1:
@@ -140,7 +140,7 @@ def _settings(item: Item, found: str) -> dict[str, Setting]:
             words["supportedRange"] = f"{low}:{high}:{plain(item.range.step or 1.0)}"
         else:
             words["setpointRange"] = f"{low}:{high}"
-    if attribute in ("RangeValue", "Mode") and item.read_only:
+    if attribute in ("RangeValue", "Mode") and item.only_told:
         words["nonControllable"] = True
     return words
 

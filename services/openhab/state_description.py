@@ -36,7 +36,7 @@ def description(
 
 def of_item(item: Item) -> tuple[Metadata, ...]:
     """The metadata of an item of the home."""
-    return description(pattern=pattern(item), read_only=item.read_only, range_=item.range, options=item.options)
+    return description(pattern=pattern(item), read_only=item.only_told, range_=item.range, options=item.options)
 
 
 def pattern(item: Item) -> str | None:

@@ -147,7 +147,7 @@ def first_state(item: Item) -> str:
     kind = base_type(item.type)
     if kind == "String" and item.options:
         return next(iter(item.options))
-    if kind == "Number" and not item.read_only:
+    if kind == "Number" and not item.only_told:
         low, high = (item.range.min, item.range.max) if item.range else (0.0, 100.0)
         usual = convert(21.0, "°C", unit_of(item)) if item.type == "Number:Temperature" else low
         return _with_unit(item, min(high, max(low, usual)))

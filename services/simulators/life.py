@@ -40,11 +40,11 @@ class Life:
         self._air: dict[str, climate.Room] = {}
         self._outdoor = self._damp = 0.0  # the weather: °C, and vapour pressure in Pa
         self._until: dict[str, float] = {}  # motion sensor or door -> when it goes off again
-        self._sensors = [name for name in devices if home.items[name].read_only and self._kind(name) == "Number"]
+        self._sensors = [name for name in devices if home.items[name].only_told and self._kind(name) == "Number"]
         self._setpoints = {
             home.room_of(name): name
             for name in devices
-            if home.items[name].type == "Number:Temperature" and not home.items[name].read_only
+            if home.items[name].type == "Number:Temperature" and not home.items[name].only_told
         }
 
     def begin(self, time: float) -> None:
@@ -123,7 +123,7 @@ class Life:
         levels = [
             _level(mate, self._devices[other])
             for other, mate in self._mates(name)
-            if base_type(mate.type) in LIT and not mate.read_only
+            if base_type(mate.type) in LIT and not mate.only_told
         ]
         return f"{max(convert(STANDBY_W, 'W', unit), rated * max(levels, default=1.0) * noise):.1f} {unit}"
 
@@ -136,7 +136,7 @@ class Life:
         for name in self._devices:
             if self._home.room_of(name) not in (room, None):
                 continue
-            if self._kind(name) == "Switch" and self._home.items[name].read_only:
+            if self._kind(name) == "Switch" and self._home.items[name].only_told:
                 self._notice(name, "ON", "OFF", time, self._draw.uniform(*MOTION_S))
             elif self._kind(name) == "Contact" and self._draw.random() < DOOR_USED:
                 self._notice(name, "OPEN", "CLOSED", time, self._draw.uniform(*DOOR_S))
@@ -146,7 +146,7 @@ class Life:
         if self._devices[name] != on:
             self._report(name, on)
             for other, item in self._mates(name):
-                if item.type == "DateTime" and item.read_only:
+                if item.type == "DateTime" and item.only_told:
                     self._report(other, moment_text(self._local(time)))
         self._until[name] = time + seconds
         self._agenda.at(time + seconds, partial(self._calm, name, off))

@@ -84,6 +84,9 @@ def test_a_home_without_faults_has_none() -> None:
         ({"items": {"A": item(thing="toaster")}}, ("items", "A", "thing"), "toaster"),
         ({"items": {"A": item(room="attic")}}, ("items", "A", "room"), "attic"),
         ({"items": {"A": item(groups=["gLights", "gNone"])}}, ("items", "A", "groups"), "gNone"),
+        ({"items": {"A": item(mqtt={"state": "a"})}}, ("items", "A", "mqtt"), "got none"),
+        ({"items": {"A": item(thing="lamp", mqtt={"state": "a"})}}, ("items", "A", "mqtt"), "'lamp' of kind zwave"),
+        ({"things": {"lamp": {"label": "x", "mqtt": {"availability": "a"}}}}, ("things", "lamp", "mqtt"), "got zwave"),
         ({"items": {"1A": item()}}, ("items", "1A"), "digit"),
         ({"items": {"A-B": item()}}, ("items", "A-B"), "digit"),
         ({"items": {"A\n": item()}}, ("items", "A\n"), "digit"),
@@ -187,6 +190,9 @@ def test_an_item_is_in_its_own_room_or_in_its_things() -> None:
         ({"type": "Contact"}, False),
         ({"type": "Image"}, False),
         ({"type": "Number:Power"}, True),
+        ({"mqtt": {"state": "dev/lamp"}}, False),
+        ({"mqtt": {"state": "dev/lamp", "command": "dev/lamp/set"}}, True),
+        ({"mqtt": {"state": "dev/lamp"}, "channels": {"zwave:device:c:switch": {}}}, True),
     ],
 )
 def test_who_takes_commands(fields: dict[str, Any], takes: bool) -> None:

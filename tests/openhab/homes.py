@@ -63,8 +63,8 @@ def _sized(index: int, kind: str) -> dict[str, Any]:
 
 
 @st.composite
-def items(draw: st.DrawFn, rooms: list[str], things: list[str], groups: list[str]) -> dict[str, Any]:
-    """One item with anything that the model allows."""
+def items(draw: st.DrawFn, rooms: list[str], things: dict[str, str], groups: list[str]) -> dict[str, Any]:
+    """One item with anything that the model allows; `things` with their kinds."""
     fields: dict[str, Any] = {"type": draw(st.sampled_from(TYPES)), "label": draw(words)}
     fields["thing"] = draw(st.sampled_from([None, *things]))
     fields["room"] = draw(st.sampled_from([None, *rooms]))
@@ -83,7 +83,8 @@ def items(draw: st.DrawFn, rooms: list[str], things: list[str], groups: list[str
     fields["expire"] = draw(st.sampled_from([None, "5m", "2d,UNDEF"]))
     fields["tags"] = draw(st.sampled_from([None, [], ["Point", 'a "tag"']]))
     topics = {"state": forms.CONTROL.sub("", draw(words)).replace("+", "").replace("#", "") or "a", "on": draw(words)}
-    fields["mqtt"] = draw(st.sampled_from([None, topics]))
+    topics |= draw(st.sampled_from([{}, {"command": "dev/set"}]))
+    fields["mqtt"] = draw(st.sampled_from([None, topics])) if things.get(fields["thing"]) == "mqtt" else None
     fields["channels"] = draw(
         st.sampled_from([{}, {"zwave:device:c:node2:switch": {}}, {"a:b:c:d#e-f": {"profile": "follow", "x": -1.5}}])
     )
@@ -94,7 +95,8 @@ def items(draw: st.DrawFn, rooms: list[str], things: list[str], groups: list[str
 def homes(draw: st.DrawFn) -> Home:
     """Any home whose references are whole."""
     rooms = draw(st.lists(words.filter(bool), unique=True, max_size=3))
-    things = draw(st.lists(words.filter(bool), unique=True, max_size=3))
+    kinds = st.sampled_from(["zwave", "mqtt"])
+    things = draw(st.dictionaries(words.filter(bool), kinds, max_size=3))
     groups = draw(st.lists(names.filter(lambda name: name != "ROS"), unique=True, max_size=3))
     own = draw(st.lists(names.filter(lambda name: name not in (*groups, "ROS")), unique=True, min_size=1, max_size=8))
     return Home.model_validate(
@@ -102,8 +104,8 @@ def homes(draw: st.DrawFn) -> Home:
             "timezone": draw(st.sampled_from(["UTC", "Europe/Madrid"])),
             "rooms": {key: {"label": draw(words)} for key in rooms},
             "things": {key: {"label": draw(words), "room": draw(st.sampled_from([None, *rooms])),
-                             "kind": draw(st.sampled_from(["zwave", "mqtt"])),
-                             "alexa": draw(st.sampled_from([None, {}]))} for key in things},
+                             "kind": kind, "alexa": draw(st.sampled_from([None, {}]))}
+                       for key, kind in things.items()},
             "groups": {key: draw(words) for key in groups},
             "items": {name: draw(items(rooms, things, groups)) for name in own},
         }

@@ -99,6 +99,21 @@ def test_every_member_of_ros_is_in_the_group_and_no_other() -> None:
         assert ("ROS)" in line) == item.ros, line
 
 
+def test_a_plain_device_without_a_topic_of_commands_is_only_shown() -> None:
+    def written(topics: dict[str, str]) -> dict[str, str]:
+        lamp = {"type": "Switch", "label": "Lamp", "thing": "lamp", "mqtt": topics, "alexa": {}}
+        thing = {"label": "Lamp", "kind": "mqtt"}
+        return files(Site(Home.model_validate({"things": {"lamp": thing}, "items": {"Lamp": lamp}}), parse("5")))
+
+    shown, steered = written({"state": "dev/lamp"}), written({"state": "dev/lamp", "command": "dev/lamp/set"})
+    assert "Text item=Lamp\n" in shown["sitemaps/apartment.sitemap"]
+    assert "Switch item=Lamp\n" in steered["sitemaps/apartment.sitemap"]
+    assert 'readOnly="true"' in shown["items/apartment.items"]
+    assert 'readOnly="true"' not in steered["items/apartment.items"]
+    assert 'alexa="MotionSensor"' in shown["items/apartment.items"]
+    assert 'alexa="Switch"' in steered["items/apartment.items"]
+
+
 def test_a_camera_shows_its_picture_through_our_proxy_while_the_stream_is_on() -> None:
     camera = Camera("ip1", ("Kitchen",), (582,), "http://192.0.2.1:8081/camera/ip1/stream.mjpg")
     text = files(Site(shipped(), parse("5"), (camera,)))["sitemaps/apartment.sitemap"]
