@@ -140,9 +140,9 @@ def test_the_files_that_services_name_are_checked_too(folder: Path) -> None:
 
 def test_a_strategy_that_nobody_knows_is_told_with_its_line(folder: Path) -> None:
     home = folder / "home.yaml"
-    line = spoil(home, "persist: [restoreOnStartup]", "persist: [restorOnStartup]", first=True)
+    line = spoil(home, "[everyChange, restoreOnStartup]", "[everyChange, restorOnStartup]", first=True)
     (told,) = faults(folder / "simulated.yaml")
-    assert told.startswith(f"{home}:{line}: items.Home_Location.persist[0]: expected 'everyChange', 'everyUpdate' or ")
+    assert told.startswith(f"{home}:{line}: items.Home_Location.persist[1]: expected 'everyChange', 'everyUpdate' or ")
     assert told.endswith(", got 'restorOnStartup'")
 
 

@@ -249,6 +249,8 @@ def _form_faults(place: tuple[str, ...], item: Item) -> Iterator[Fault]:
         yield from _topic_faults((*place, "mqtt"), item.mqtt)
     for uid, settings in item.channels.items():
         yield from _told((*place, "channels", uid), forms.channel(uid), *map(forms.key, settings))
+    if set(item.persist) == {"restoreOnStartup"}:
+        yield (*place, "persist"), "expected everyChange or everyUpdate beside restoreOnStartup, which stores nothing"
     if item.expire is not None:
         yield from _told((*place, "expire"), forms.expire(item.expire))
     yield from _settings_faults(place, item.alexa, item.metadata)

@@ -41,7 +41,10 @@ def _wrapped(names: list[str]) -> str:
 
 
 def strategies_of(item: str, groups: Collection[str], files: Iterable[Persisted]) -> tuple[str, ...] | None:
-    """The strategies of OpenHAB's own that files give an item, in a fixed order; None when no file says anything."""
+    """The strategies of OpenHAB's own that files give an item, in a fixed order; None when no file says anything.
+
+    What is restored is stored at changes too: by cron alone a home cannot say it, and alone it restores from nothing.
+    """
     found: set[str] = set()
     said = False
     for stored in files:
@@ -49,4 +52,6 @@ def strategies_of(item: str, groups: Collection[str], files: Iterable[Persisted]
         for names, strategies in stored.strategies:
             if item in names or "*" in names or any(f"{group}*" in names for group in groups):
                 found |= set(strategies)
+    if "restoreOnStartup" in found and "everyUpdate" not in found:
+        found.add("everyChange")
     return tuple(one for one in BUILT_IN if one in found) if said else None

@@ -131,6 +131,7 @@ MQTT = {"lamp": {"label": "Lamp", "kind": "mqtt"}}  # things
         ({"items": {"A": item(metadata={"my ns": {}})}}, ("items", "A", "metadata", "my ns"), "'my ns'"),
         ({"items": {"A": item(metadata={"ns": {"settings": {"a b": 1}}})}}, ("items", "A", "metadata", "ns"), "'a b'"),
         ({"items": {"A": item(alexa={"settings": {"a b": 1}})}}, ("items", "A", "alexa", "settings"), "'a b'"),
+        ({"items": {"A": item(persist=["restoreOnStartup"])}}, ("items", "A", "persist"), "beside restoreOnStartup"),
         ({"items": {"A": item(expire="soon")}}, ("items", "A", "expire"), "'soon'"),
     ],
 )  # fmt: skip

@@ -38,6 +38,7 @@ Strategies {
 Items {
   ROS* : strategy = everyChange, restoreOnStartup
   Lamp : strategy = everyUpdate, everyHour
+  Mode : strategy = everyHour, restoreOnStartup
 }
 """
 LAB = {"a.items": ITEMS, "a.things": THINGS, "jdbc.persist": STORED}
@@ -55,6 +56,7 @@ def test_a_lab_comes_with_rooms_devices_groups_and_what_is_stored() -> None:
     assert home.items["Lab_Temp"].unit == "°C"
     assert home.items["Lab_Temp"].thing == home.items["Lab_Humidity"].thing
     assert home.items["Lab_Humidity"].persist == ()
+    assert home.items["Mode"].persist == ("everyChange", "restoreOnStartup")
     assert home.items["Mode"].options == {"a": "As wanted", "b": "Better"}
     assert home.items["Mode"].metadata["homekit"].settings == {"y": 1}
     assert home.groups["gAny"] == Group(
