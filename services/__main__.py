@@ -117,7 +117,8 @@ def topics_(
     if write is not None:
         write.write_text(page.markdown(), encoding="utf-8")
     if acl is not None:
-        acl.write_text(access.acl(load(config).cameras), encoding="utf-8")
+        apartment = load(config)
+        acl.write_text(access.acl(apartment.cameras, apartment.home), encoding="utf-8")
     if passwords is not None:
         accounts = load(config).bus.accounts
         access.write_passwords(passwords, {name: one.get_secret_value() for name, one in accounts.items() if one})

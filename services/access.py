@@ -1,5 +1,6 @@
 """Who may do what at the broker: mosquitto's ACL from the topic table, one account per service.
 
+The topics of the home's plain MQTT devices are in no table: they come from the home, for OpenHAB and for the devices.
 Not here: the passwords themselves (`apartment secrets`, environment or credential files).
 """
 
@@ -12,6 +13,7 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from services.apartment.home import Home
 from services.registry import REGISTRY
 from services.topics import TABLE, Topic
 from services.whole_file import write_private
@@ -19,32 +21,34 @@ from services.whole_file import write_private
 CONF = Path(__file__).parents[1] / "mosquitto" / "mosquitto.conf"
 TLS_CONF = CONF.with_name("tls.conf")
 PLAYS = {row.name: row.plays for row in REGISTRY if row.plays}
+OPENHAB, DEVICES = "openhab", "devices"  # who hears the plain MQTT devices, and they themselves
 ITERATIONS = 101  # of PBKDF2, as mosquitto_passwd of Debian 12 writes
 
 
 def accounts(cameras: Iterable[str]) -> list[str]:
-    """Every account that a broker of ours knows: services, roles of the table, one per camera."""
+    """Every account that a broker of ours knows: services, roles of the table, plain devices, one per camera."""
     own = {row.name for row in REGISTRY if row.on_bus and "<cam>" not in row.name}
     roles = {role for row in TABLE for role in (*row.writers, *row.readers) if "<" not in role}
-    return [*sorted(own | roles), *(f"camera-{camera}" for camera in cameras)]
+    return [*sorted(own | roles | {DEVICES}), *(f"camera-{camera}" for camera in cameras)]
 
 
-def acl(cameras: Iterable[str], *, anonymous: bool = False) -> str:
-    """mosquitto's acl_file: what each account may write and read.
+def acl(cameras: Iterable[str], home: Home | None = None, *, anonymous: bool = False) -> str:
+    """mosquitto's acl_file: what each account may write and read; of the devices of `home` too.
 
     `anonymous`: a client without a name may do everything. For the demo and for tests on loopback, where a newcomer
     plays the home, the robot and the operator in turn; an installation has no such clients.
     """
     cameras = list(cameras)
-    lines = ["# Written by `apartment topics --acl` from services/topics/; a test keeps them equal.", ""]
+    lines = ["# Written by `apartment topics --acl` from services/topics/ and the home; a test keeps them equal.", ""]
     if anonymous:
         lines += ["# whoever gives no name", "topic readwrite #", ""]
     for account in accounts(cameras):
-        lines += [f"user {account}", *_rights(account, cameras), ""]
+        own = [] if account == DEVICES else _rights(account)
+        lines += [f"user {account}", *own, *_rights_of_devices(account, home), ""]
     return "\n".join(lines)
 
 
-def _rights(account: str, cameras: list[str]) -> list[str]:
+def _rights(account: str) -> list[str]:
     rows: dict[str, str] = {}
     for topic in TABLE:
         writes, reads = _may(account, topic.writers), _may(account, topic.readers)
@@ -70,6 +74,39 @@ def _add(rows: dict[str, str], account: str, topic: Topic, *, writes: bool, read
     own = {"cam": camera} if camera and "cam" in topic.names else {}
     right = "readwrite" if writes and reads else "write" if writes else "read"
     rows.update(dict.fromkeys(topic.filters_for(**own), right))
+
+
+def _rights_of_devices(account: str, home: Home | None) -> list[str]:
+    """What OpenHAB and the plain devices may beside the table; a topic that a row of it means is left to that row."""
+    if home is None or account not in (OPENHAB, DEVICES):
+        return []
+    topics = (one.mqtt for one in home.items.values() if one.mqtt is not None)
+    told = [one.mqtt.availability for one in home.things.values() if one.mqtt is not None]
+    wanted: list[str] = []
+    for one in topics:
+        told += [one.state] if one.state is not None else []
+        wanted += [one.command] if one.command is not None else []
+    rows: dict[str, str] = {}
+    for topic in sorted({*told, *wanted}):
+        heard, said = (told, wanted) if account == OPENHAB else (wanted, told)
+        if not _is_ours(topic):
+            rows[topic] = "readwrite" if topic in heard and topic in said else "read" if topic in heard else "write"
+    return [f"topic {right} {topic}" for topic, right in rows.items()]
+
+
+def _is_ours(topic: str) -> bool:
+    return topic.startswith("$") or any(_meet(topic.split("/"), row.filter.split("/")) for row in TABLE)
+
+
+def _meet(one: list[str], other: list[str]) -> bool:
+    """Whether there is a topic that both filters mean."""
+    for here, there in zip(one, other, strict=False):
+        if "#" in (here, there):
+            return True
+        if here != there and "+" not in (here, there):
+            return False
+    rest = one[len(other) :] or other[len(one) :]
+    return rest in ([], ["#"])
 
 
 def _may(account: str, roles: tuple[str, ...]) -> bool:

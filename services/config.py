@@ -112,7 +112,7 @@ def load(
     if not source.faults and not raw:
         source.fault((), "expected sections such as bus, home and cameras, got nothing")
     top = _model(Top, {key: raw[key] for key in TOP if key in raw}, source, ())
-    home, home_faults = _home(file.parent / raw["home"]) if isinstance(raw.get("home"), str) else (None, [])
+    home, home_faults = home_in(file.parent / raw["home"]) if isinstance(raw.get("home"), str) else (None, [])
     cameras = _cameras(raw, source)
     state = _state_folder(top or Top(home=file), file, environment)
     given = {"home": home, "cameras": cameras, "folder": file.parent, "state": state}
@@ -157,7 +157,8 @@ def _state_folder(top: Top, file: Path, environment: Mapping[str, str]) -> Path:
     return Path(environment.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "apartment"
 
 
-def _home(file: Path) -> tuple[Home | None, list[str]]:
+def home_in(file: Path) -> tuple[Home | None, list[str]]:
+    """The home of its file, and its faults."""
     source = document.read(file)
     home = None if source.faults else _model(Home, source.value or {}, source, ())
     if home is not None:

@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 
 from services import access, topics
+from services.apartment.home import Home
 from services.bus import Message
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.client import Client
+from services.config import home_in
 from services.peers import mosquitto, program
 from services.topics import page
 
@@ -23,13 +25,42 @@ ROOT = Path(__file__).parents[1]
 
 def test_the_written_files_equal_what_the_code_generates() -> None:
     assert (ROOT / "bus_topics.md").read_text(encoding="utf-8") == page.markdown()
-    assert (ROOT / "mosquitto/acl").read_text(encoding="utf-8") == access.acl(["ip1"])
+    home, _ = home_in(ROOT / "config/home.yaml")
+    assert (ROOT / "mosquitto/acl").read_text(encoding="utf-8") == access.acl(["ip1"], home)
 
 
 def test_every_role_of_the_table_has_an_account() -> None:
     known = {*access.accounts(["ip1"]), "camera-<cam>", "<service>"}
     for row in topics.TABLE:
         assert {*row.writers, *row.readers} <= known, row.pattern
+
+
+@pytest.mark.parametrize(
+    ("state", "command", "granted"),
+    [
+        ("dev/lamp", "dev/lamp/set", {"dev/lamp", "dev/lamp/set"}),
+        ("dev/+/lamp", None, {"dev/+/lamp"}),
+        ("dev/lamp", "dev/lamp", {"dev/lamp"}),
+        ("camera/ip1/position", "camera/ip1/order/Goto", set()),
+        ("home/Lamp/state", "home/Lamp/command", set()),
+        ("+/ip1/position", "service/bridge/reload/set", set()),
+        ("#", None, set()),
+        ("$SYS/broker/uptime", "dev/lamp/set", {"dev/lamp/set"}),
+    ],
+)
+def test_no_topic_of_the_table_is_opened_for_a_plain_device(state: str, command: str | None, granted: set[str]) -> None:
+    lamp = {"type": "Switch", "label": "x", "thing": "lamp", "mqtt": {"state": state, "command": command}}
+    thing = {"label": "x", "kind": "mqtt"}
+    home = Home.model_validate({"things": {"lamp": thing}, "items": {"Lamp": lamp}})
+
+    def lists(home: Home | None) -> dict[str, set[str]]:
+        blocks = [part.splitlines() for part in access.acl(["ip1"], home).split("\nuser ")[1:]]
+        return {name: {line.split(" ", 2)[2] for line in lines if line} for name, *lines in blocks}
+
+    before, after = lists(None), lists(home)
+    assert after["devices"] == granted
+    assert {name for name in after if after[name] != before[name]} == ({"openhab", "devices"} if granted else set())
+    assert after["openhab"] - before["openhab"] == granted
 
 
 @pytest.mark.mosquitto

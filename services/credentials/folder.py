@@ -16,8 +16,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 from services import access, document
+from services.apartment.home import Home
+from services.config import home_in
 from services.credentials import certificates, passwords
 from services.credentials.certificates import Pair
 from services.errors import ConfigError
@@ -90,11 +93,23 @@ def fill(folder: Folder, config: Path, hosts: Sequence[str], now: datetime, *, f
     source = document.read(config)
     if source.value is None:
         raise ConfigError(source.faults)
+    home = _home(config, source.value)
     folder.make()
     yield from _fill_passwords(folder, config, force=force)
     yield from _fill_certificates(folder, hosts, now, force=force)
-    write_broker(folder, passwords.cameras(source.value))
+    write_broker(folder, passwords.cameras(source.value), home)
     yield f"{folder.path / 'broker'}: password file, access list and mosquitto.conf"
+
+
+def _home(config: Path, value: Any) -> Home:
+    """The home of a configuration as it was read; ConfigError with its faults."""
+    named = value.get("home") if isinstance(value, dict) else None
+    if not isinstance(named, str):
+        raise ConfigError([f"{config}:1: home: expected a file, got {named!r}"])
+    home, faults = home_in(config.parent / named)
+    if home is None or faults:
+        raise ConfigError(faults)
+    return home
 
 
 def _fill_passwords(folder: Folder, config: Path, *, force: bool) -> Iterator[str]:
@@ -136,13 +151,13 @@ def renew(folder: Folder, within: timedelta, now: datetime) -> Iterator[str]:
             yield f"{folder.path / name}: renewed until {certificates.ends(fresh.certificate):%Y-%m-%d}"
 
 
-def write_broker(folder: Folder, cameras: Sequence[str]) -> None:
+def write_broker(folder: Folder, cameras: Sequence[str], home: Home) -> None:
     """Writes what mosquitto is started with. Accounts that somebody added to the password file stay in it."""
     broker, secrets = folder.make("broker"), folder.secrets()
     ours = {account: secrets[passwords.name_of(account)] for account in access.accounts(cameras)}
     lines = [access.password_line(account, password) for account, password in ours.items()]
     write_private(broker / "passwords", "".join(f"{line}\n" for line in [*lines, *_others(broker, ours)]))
-    write_private(broker / "acl", access.acl(cameras))
+    write_private(broker / "acl", access.acl(cameras, home))
     write_private(broker / "mosquitto.conf", access.broker_conf(broker))
 
 

@@ -1,11 +1,15 @@
 """What each account may do by the table of topics, worked out from the table alone and not by the code that writes
-the broker's access list; and one example topic (several, where it matters whose it is) for every row."""
+the broker's access list; one example topic (several, where it matters whose it is) for every row; and what OpenHAB and
+the plain MQTT devices of the example home may beside the table."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
+
+import yaml
 
 from services.registry import REGISTRY
 from services.topics import TABLE, Topic
@@ -16,6 +20,11 @@ EXAMPLES = {
     "platform": ("sensor",), "entity": ("motion",), "device": ("home",), "node": ("lab-lamp",), "property": ("state",),
     "attribute": ("$name",), "trait": ("$name", "$unit"), "component": ("camera/ip1/motors",),
 }  # fmt: skip
+HOME = yaml.safe_load((Path(__file__).parents[2] / "config" / "home.yaml").read_text(encoding="utf-8"))
+SAID = {one["mqtt"]["state"] for one in HOME["items"].values() if "mqtt" in one} | {
+    one["mqtt"]["availability"] for one in HOME["things"].values() if "mqtt" in one
+}
+HEARD = {one["mqtt"]["command"] for one in HOME["items"].values() if "command" in one.get("mqtt", {})}
 STRANGE = (
     "foo", "home", "home/Lab_Lamp", "home/Lab_Lamp/state/more", "home//state/x", "camera/ip1", "camera/ip1/order",
     "service/all/status/x", "diagnostic", "Home/Lab_Lamp/state", "/home/Lab_Lamp/state", "$SYS/broker/uptime",
@@ -55,3 +64,10 @@ def may(account: str, who: tuple[str, ...], case: Case) -> bool:
     if meant == {"camera-<cam>"} and "cam" in case.levels:
         return account == f"camera-{case.levels['cam']}"
     return bool(meant)
+
+
+def of_devices(account: str, *, write: bool) -> set[str]:
+    """Which topics of the plain devices an account may write or read: OpenHAB steers them, they say how they are."""
+    return {("openhab", True): HEARD, ("openhab", False): SAID, ("devices", True): SAID, ("devices", False): HEARD}.get(
+        (account, write), set()
+    )

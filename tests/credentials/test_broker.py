@@ -27,12 +27,12 @@ from services.bus.mqtt import MqttBus
 from services.credentials import passwords
 from services.credentials.folder import Folder, fill, renew
 from services.peers import answers, free_port, program, running, wait_until
-from tests.credentials.rights import CAMERAS, STRANGE, Case, cases, may
+from tests.credentials.rights import CAMERAS, HEARD, SAID, STRANGE, Case, cases, may, of_devices
 
 pytestmark = pytest.mark.mosquitto
 CONFIG = Path(__file__).parents[2] / "config"
 ACCOUNTS = access.accounts(CAMERAS)
-CASES = list(cases(ACCOUNTS))
+CASES = list(cases([account for account in ACCOUNTS if account != access.DEVICES]))  # they are no service
 OBSERVER = "observer"  # of the test alone: may everything
 LIMIT_S = 20.0
 
@@ -127,7 +127,13 @@ def mouth(broker: Broker, account: str, *, name: str = "", will: str = "") -> It
 
 
 def _topics(account: str, *, write: bool) -> set[str]:
-    return {case.topic for case in CASES if may(account, case.row.writers if write else case.row.readers, case)}
+    of_table = {case.topic for case in CASES if may(account, case.row.writers if write else case.row.readers, case)}
+    return of_table | of_devices(account, write=write)
+
+
+def _answers(account: str) -> set[str]:
+    """A device is asked nothing."""
+    return set() if account == access.DEVICES else {"reply/me"}
 
 
 def test_every_row_has_somebody_who_writes_and_somebody_who_reads() -> None:
@@ -155,15 +161,15 @@ def test_a_service_tells_once_which_answer_the_broker_does_not_take_from_it(
 
 
 def test_every_account_writes_what_the_table_says_and_nothing_else(broker: Broker) -> None:
-    everything = [case.topic for case in CASES] + list(STRANGE)
+    everything = [case.topic for case in CASES] + [*SAID, *HEARD, *STRANGE]
     expected = {(topic, account) for account in ACCOUNTS for topic in _topics(account, write=True)}
     with mouth(broker, OBSERVER) as observer:
         observer.listen("#")
         for account in ACCOUNTS:
             with mouth(broker, account) as speaker:
                 taken = {topic for topic, well in speaker.say([*everything, "reply/me"]).items() if well}
-            assert taken == _topics(account, write=True) | {"reply/me"}, account
-        expected |= {("reply/me", account) for account in ACCOUNTS}
+            assert taken == _topics(account, write=True) | _answers(account), account
+        expected |= {(topic, account) for account in ACCOUNTS for topic in _answers(account)}
         wait_until(lambda: len(observer.came) >= len(expected), "what was said", LIMIT_S)
         observer.say(["end"])
         wait_until(lambda: observer.came[-1][0] == "end", "the end", LIMIT_S)
@@ -173,7 +179,7 @@ def test_every_account_writes_what_the_table_says_and_nothing_else(broker: Broke
 
 def test_every_account_reads_what_the_table_says_however_it_asks(broker: Broker) -> None:
     """Kept messages and new ones; by `#`, by a shared subscription and by each topic's own name."""
-    everything = [case.topic for case in CASES] + [one for one in STRANGE if not one.startswith("$")]
+    everything = [case.topic for case in CASES] + [*SAID, *HEARD, *(one for one in STRANGE if one[0] != "$")]
     with mouth(broker, OBSERVER) as observer:
         observer.say([*everything, "reply/me"], retain=True)
         try:

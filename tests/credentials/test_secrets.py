@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import ssl
 import subprocess
 import sys
@@ -117,6 +118,15 @@ def test_a_repository_is_no_place_for_secrets(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="outside of"):
         list(fill(Folder(tmp_path / "config/secrets"), CONFIG, HOSTS, NOW))
     assert not (tmp_path / "config").exists()
+
+
+def test_a_fault_of_the_home_is_told_before_anything_is_made(tmp_path: Path) -> None:
+    config = Path(shutil.copytree(CONFIG.parent, tmp_path / "config")) / CONFIG.name
+    home = config.with_name("home.yaml")
+    home.write_text(home.read_text(encoding="utf-8").replace("dev/lamp/color/set", "dev/+/set"), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"home\.yaml:\d+: items\.Lamp_Color\.mqtt\.command: expected a topic"):
+        list(fill(Folder(tmp_path / "secrets"), config, HOSTS, NOW))
+    assert not (tmp_path / "secrets").exists()
 
 
 def test_the_command_makes_them_and_takes_one_that_is_brought(tmp_path: Path) -> None:
