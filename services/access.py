@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from services.apartment.forms import STOP_TOPIC
 from services.apartment.home import Home
 from services.registry import REGISTRY
 from services.topics import TABLE, Topic
@@ -86,6 +87,7 @@ def _rights_of_devices(account: str, home: Home | None) -> list[str]:
     for one in topics:
         told += [one.state] if one.state is not None else []
         wanted += [one.command] if one.command is not None else []
+        wanted += [str(one.settings[STOP_TOPIC])] if STOP_TOPIC in one.settings else []
     rows: dict[str, str] = {}
     for topic in sorted({*told, *wanted}):
         heard, said = (told, wanted) if account == OPENHAB else (wanted, told)

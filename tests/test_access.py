@@ -63,6 +63,15 @@ def test_no_topic_of_the_table_is_opened_for_a_plain_device(state: str, command:
     assert after["openhab"] - before["openhab"] == granted
 
 
+def test_a_shutter_may_hear_its_stop_on_a_topic_of_its_own() -> None:
+    topics = {"state": "dev/s", "command": "dev/s/set", "settings": {"stopCommandTopic": "dev/s/stop"}}
+    shutter = {"type": "Rollershutter", "label": "x", "thing": "s", "mqtt": topics}
+    home = Home.model_validate({"things": {"s": {"label": "x", "kind": "mqtt"}}, "items": {"Shutter": shutter}})
+    own = {part.partition("\n")[0]: part for part in access.acl([], home).split("\nuser ")}
+    assert "\ntopic write dev/s/stop\n" in own["openhab"]
+    assert "\ntopic read dev/s/stop\n" in own["devices"]
+
+
 @pytest.mark.mosquitto
 def test_our_password_lines_are_those_of_mosquitto_passwd(tmp_path: Path) -> None:
     tool = program("mosquitto_passwd", "mosquitto")

@@ -23,6 +23,11 @@ DIMENSIONS = frozenset((
 FUNCTIONS = ("EQUALITY", "AND", "OR", "NAND", "NOR", "AVG", "SUM", "MAX", "MIN", "COUNT", "LATEST", "EARLIEST")
 NEW_FUNCTIONS = ("XOR", "MEDIAN")  # from 4.3 on
 ARGUMENTS = {"AND": 2, "OR": 2, "NAND": 2, "NOR": 2, "XOR": 2, "COUNT": 1}
+TOPIC_SETTINGS = {  # of a plain MQTT device's item -> of the binding's channel
+    "state": "stateTopic", "command": "commandTopic", "transform": "transformationPattern",
+    "transform_out": "transformationPatternOut", "on": "on", "off": "off", "stop": "stop",
+}  # fmt: skip
+STOP_TOPIC = "stopCommandTopic"  # among its other settings: where a shutter hears its stop, if not with its commands
 KEY = re.compile(r"[a-zA-Z0-9_][a-zA-Z0-9_-]*")  # of metadata and of settings
 SEGMENT = re.compile(r"[A-Za-z0-9_-]+")  # of a UID
 CONTROL = re.compile(r"[\0-\x1f\x7f-\x9f]")  # a broker throws out who says a topic with one

@@ -103,6 +103,7 @@ class MqttTopics(Section):
     on: str | None = None  # the device's words for ON or OPEN or UP, and the others
     off: str | None = None
     stop: str | None = None
+    settings: dict[str, Value] = Field(default={})  # any other of the binding's channel, such as `min` or `colorMode`
 
 
 class Item(Section):
@@ -263,6 +264,13 @@ def _topic_faults(place: tuple[str, ...], said: MqttTopics) -> Iterator[Fault]:
         yield from _told((*place, "state"), forms.mqtt_filter(said.state))
     if said.command is not None:
         yield from _told((*place, "command"), forms.mqtt_topic(said.command))
+    if forms.STOP_TOPIC in said.settings:
+        stop = (*place, "settings", forms.STOP_TOPIC)
+        yield from _told(stop, forms.mqtt_topic(str(said.settings[forms.STOP_TOPIC])))
+    yield from _told((*place, "settings"), *map(forms.key, said.settings))
+    for field, setting in forms.TOPIC_SETTINGS.items():
+        if setting in said.settings:
+            yield (*place, "settings", setting), f"expected {field} beside settings, got {setting!r}"
 
 
 def _settings_faults(place: tuple[str, ...], alexa: Alexa | None, others: dict[str, Metadata]) -> Iterator[Fault]:

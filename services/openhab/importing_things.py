@@ -1,18 +1,24 @@
 """The devices of a lab's own files: the things that its items are linked to. Pure.
 
-Generic topic things become plain MQTT devices with their topics; of other things the links are kept as they are.
+Generic topic things become plain MQTT devices with their topics and settings. A link is kept as it is where the thing
+is of another kind, or where the home could not say the same: then the thing has to stay in the lab's own file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+from services.apartment.forms import TOPIC_SETTINGS
 from services.apartment.home import MqttTopics
-from services.openhab.lines import ChannelLine, ThingLine, identifier
+from services.openhab.lines import ChannelLine, Setting, ThingLine, identifier
+from services.openhab.mqtt import CHANNEL_TYPES
+from services.openhab.readback import values
+from services.states import base_type
 
 KINDS = {"zwave": "zwave", "mqtt": "mqtt"}  # others are virtual for us
 GENERIC = "mqtt:topic:"
+AVAILABILITY = {"availabilityTopic", "payloadAvailable", "payloadNotAvailable"}  # what the home can say of a thing
 
 
 def assign(items: dict[str, dict[str, Any]], things: Iterable[ThingLine]) -> dict[str, dict[str, Any]]:
@@ -28,10 +34,17 @@ def assign(items: dict[str, dict[str, Any]], things: Iterable[ThingLine]) -> dic
         found.setdefault(key, _device(owner, known.get(owner)))
         fields["thing"] = key
         channel = _channel(known.get(owner), id)
-        if owner.startswith(GENERIC) and channel is not None and not fields["channels"][uid]:
+        if owner.startswith(GENERIC) and channel is not None and _is_sayable(known[owner], channel, fields, uid):
             fields["mqtt"] = _topics(channel)
             del fields["channels"][uid]
     return found
+
+
+def _is_sayable(thing: ThingLine, channel: ChannelLine, fields: Mapping[str, Any], uid: str) -> bool:
+    """Whether the home makes the same of it: channels are of the item's kind there, and links have no profile."""
+    alike = channel.kind == "Type" and channel.type == CHANNEL_TYPES.get(base_type(fields["type"]))
+    heard = {"stateTopic", "commandTopic"} & channel.settings.keys()
+    return alike and bool(heard) and thing.settings.keys() <= AVAILABILITY and not fields["channels"][uid]
 
 
 def _channel(thing: ThingLine | None, id: str) -> ChannelLine | None:
@@ -46,12 +59,19 @@ def _device(uid: str, thing: ThingLine | None) -> dict[str, Any]:
         words = {"online": said.get("payloadAvailable", "ON"), "offline": said.get("payloadNotAvailable", "OFF")}
         fields["mqtt"] = {
             "availability": str(said["availabilityTopic"]),
-            **{key: str(one) for key, one in words.items()},
+            **{key: _text(one) for key, one in words.items()},
         }
     return fields
 
 
 def _topics(channel: ChannelLine) -> MqttTopics:
-    names = {"state": "stateTopic", "command": "commandTopic", "transform": "transformationPattern",
-             "transform_out": "transformationPatternOut", "on": "on", "off": "off", "stop": "stop"}  # fmt: skip
-    return MqttTopics(**{key: str(channel.settings[name]) for key, name in names.items() if name in channel.settings})
+    said = dict(channel.settings)
+    named = {field: _text(said.pop(name)) for field, name in TOPIC_SETTINGS.items() if name in said}
+    return MqttTopics(**named, settings=values(said))
+
+
+def _text(value: Setting) -> str:
+    """A setting as one text; transformations in a row have a sign of their own between them."""
+    if isinstance(value, tuple):
+        return "∩".join(map(str, value))
+    return str(value).lower() if isinstance(value, bool) else str(value)

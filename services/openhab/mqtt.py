@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from services import topics
+from services.apartment.forms import TOPIC_SETTINGS
 from services.apartment.home import Home, Item
 from services.openhab.lines import ChannelLine, Metadata, Setting, ThingLine
 from services.openhab.site import BUS, Site
@@ -29,6 +30,7 @@ CHANNEL_TYPES = {
     "Image": "image",
     "Call": "string",
 }
+COLOR_MODES = ("colorMode", "color_mode")  # the second is 2.x's word
 SILENT = ("Contact", "Call", "Image")  # what the binding never publishes
 
 
@@ -72,21 +74,15 @@ def _channel(version: Version, name: str, item: Item) -> ChannelLine:
     assert item.mqtt is not None
     kind = CHANNEL_TYPES[base_type(item.type)]
     said = item.mqtt
-    found: dict[str, Setting | None] = {
-        "stateTopic": said.state,
-        "commandTopic": None if kind in ("contact", "image") else said.command,
-        "transformationPattern": said.transform,
-        "transformationPatternOut": said.transform_out,
-        "on": said.on,
-        "off": said.off,
-        "stop": said.stop,
-        "unit": item.unit if kind == "number" else None,
-    }
+    named = {setting: getattr(said, field) for field, setting in TOPIC_SETTINGS.items()}
+    if kind in ("contact", "image"):
+        del named["commandTopic"]
+    own: dict[str, Setting | None] = {**named, "unit": item.unit if kind == "number" else None, **said.settings}
     if kind == "color":
-        found["color_mode" if version.major == 2 else "colorMode"] = "HSB"
-    return ChannelLine(
-        "Type", kind, channel_id(name), None, {key: value for key, value in found.items() if value is not None}
-    )
+        modes = [own.pop(key) for key in COLOR_MODES if key in own]
+        own[COLOR_MODES[version.major == 2]] = modes[0] if modes else "HSB"
+    settings = {key: value for key, value in own.items() if value is not None}
+    return ChannelLine("Type", kind, channel_id(name), None, settings)
 
 
 def bus_thing(site: Site) -> ThingLine:

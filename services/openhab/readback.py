@@ -78,7 +78,7 @@ def item_of(line: ItemLine, rooms: Mapping[str, str], things: Mapping[str, str])
     found["read_only"] = said.get("readOnly", "").lower() == "true"
     automatic = metadata_of(line, "autoupdate")
     found["autoupdate"] = automatic is None or automatic.value != "false"
-    found["channels"] = {one.value: _values(one.settings) for one in line.metadata if one.namespace == "channel"}
+    found["channels"] = {one.value: values(one.settings) for one in line.metadata if one.namespace == "channel"}
     found["alexa"] = alexa_of(line)
     for field in ("ga", "expire"):
         value = metadata_of(line, field)
@@ -99,7 +99,7 @@ def _tags(line: ItemLine, found: Mapping[str, Any]) -> tuple[str, ...] | None:
 
 def kept(one: Metadata) -> Kept:
     """Metadata that nothing of the home stands for, as the home keeps it."""
-    return Kept(value=one.value, settings=_values(one.settings))
+    return Kept(value=one.value, settings=values(one.settings))
 
 
 def split_label(text: str) -> tuple[str, str]:
@@ -108,7 +108,7 @@ def split_label(text: str) -> tuple[str, str]:
     return (text[: match.start()].strip(), match[1]) if match else (text, "")
 
 
-def _values(settings: Mapping[str, Setting]) -> dict[str, Any]:
+def values(settings: Mapping[str, Setting]) -> dict[str, Any]:
     """Settings as the home keeps them: a list is one text, and so is a negative number, as it is written."""
     return {key: _value(value) for key, value in settings.items()}
 
@@ -140,7 +140,7 @@ def alexa_of(line: ItemLine) -> Alexa | None:
     found = metadata_of(line, "alexa")
     if found is None:
         return None
-    settings = _values(found.settings)
+    settings = values(found.settings)
     name = settings.pop("name", None)
     return Alexa(name=None if name is None else str(name), device=found.value, settings=settings)
 

@@ -83,8 +83,9 @@ def items(draw: st.DrawFn, rooms: list[str], things: dict[str, str], groups: lis
     fields["ga"] = draw(st.sampled_from([None, "Light"]))
     fields["expire"] = draw(st.sampled_from([None, "5m", "2d,UNDEF"]))
     fields["tags"] = draw(st.sampled_from([None, [], ["Point", 'a "tag"']]))
-    topics = {"state": forms.CONTROL.sub("", draw(words)).replace("+", "").replace("#", "") or "a", "on": draw(words)}
-    topics |= draw(st.sampled_from([{}, {"command": "dev/set"}]))
+    state = forms.CONTROL.sub("", draw(words)).replace("+", "").replace("#", "") or "a"
+    topics: dict[str, Any] = {"state": state, "on": draw(words)}
+    topics |= draw(st.sampled_from([{}, {"command": "dev/set"}, {"settings": {"qos": 1, "retained": True}}]))
     fields["mqtt"] = draw(st.sampled_from([None, topics])) if things.get(fields["thing"]) == "mqtt" else None
     fields["channels"] = draw(
         st.sampled_from([{}, {"zwave:device:c:node2:switch": {}}, {"a:b:c:d#e-f": {"profile": "follow", "x": -1.5}}])

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from services.apartment.home import Group
-from services.openhab.check import check
+from services.openhab.check import check, read_site
 from services.openhab.generate import files
 from services.openhab.importing import best_version, home_of
+from services.openhab.lines import Setting, ThingLine
 from services.openhab.site import Site
 from services.openhab.versions import parse
 
@@ -74,6 +75,61 @@ def test_a_generic_thing_becomes_a_plain_mqtt_device() -> None:
     assert (thing.label, thing.kind, thing.mqtt.online, thing.mqtt.offline) == ("Hall lamp", "mqtt", "on", "OFF")
     assert lamp.alexa is not None
     assert (lamp.alexa.name, lamp.alexa.device) == ("Hall", "Light")
+
+
+PLAIN_ITEMS = """
+Dimmer Dim "Dim" { channel="mqtt:topic:lab:plain:dim" }
+Color Led "Led" { channel="mqtt:topic:lab:plain:led" }
+Number:Temperature Heat "Heat [%.1f °C]" { channel="mqtt:topic:lab:plain:heat" }
+Rollershutter Blind "Blind" { channel="mqtt:topic:lab:plain:blind" }
+Switch Plug "Plug" { channel="mqtt:topic:lab:plain:plug" }
+String Text "Text" { channel="mqtt:topic:lab:plain:text" }
+Switch Lit "Lit" { channel="mqtt:topic:lab:plain:dim" }
+Switch Far "Far" { channel="mqtt:topic:lab:odd:far" }
+"""
+PLAIN = {
+    "dim": ("dimmer", 'stateTopic="d/dim", commandTopic="d/dim/set", min=0, max=254'),
+    "led": ("color", 'stateTopic="d/led", commandTopic="d/led/set", colorMode="RGB"'),
+    "heat": ("number", 'stateTopic="d/heat", transformationPattern="JSONPATH:$.t", unit="°F"'),
+    "blind": ("rollershutter", 'stateTopic="d/b", commandTopic="d/b/set", stopCommandTopic="d/b/stop", invert=true'),
+    "plug": ("switch", 'commandTopic="d/plug/set", on=1, off=0, formatBeforePublish="<%s>", retained=true, qos=2'),
+    "text": ("string", 'stateTopic="d/text", transformationPattern="REGEX:(.*)", "MAP:a.map"'),
+}
+PLAIN_THINGS = (
+    'Bridge mqtt:broker:lab [ host="192.0.2.1" ]\n'
+    'Thing mqtt:topic:lab:plain "Plain" (mqtt:broker:lab) [ availabilityTopic="d/s", payloadAvailable=true ] {\n'
+    "  Channels:\n" + "".join(f"    Type {kind} : {id} [ {said} ]\n" for id, (kind, said) in PLAIN.items()) + "}\n"
+    'Thing mqtt:topic:lab:odd "Odd" (mqtt:broker:lab) [ availabilityTopic="d/t", transformationPattern="MAP:t" ] {\n'
+    "  Channels:\n"
+    '    Type switch : far [ stateTopic="d/far" ]\n'
+    "}\n"
+)
+
+
+def test_an_imported_channel_is_generated_with_the_settings_that_it_had() -> None:
+    lab = {"a.items": PLAIN_ITEMS, "a.things": PLAIN_THINGS}
+    home, found = home_of(lab, parse("5"))
+    assert found == []
+    assert list(home.faults()) == []
+    written = files(Site(home, parse("5")))
+    (before, _), (after, _) = (read_site(texts, parse("5"))[0].things[0] for texts in (lab, written))
+
+    def channels(things: tuple[ThingLine, ...]) -> dict[str, tuple[str, dict[str, Setting]]]:
+        return {one.id.lower(): (one.type, dict(one.settings)) for thing in things for one in thing.channels}
+
+    wanted = {id: one for id, one in channels(before).items() if id in PLAIN}
+    wanted["plug"][1].update({"on": "1", "off": "0"})
+    wanted["text"][1]["transformationPattern"] = "REGEX:(.*)∩MAP:a.map"
+    assert {id: one for id, one in channels(after).items() if id in PLAIN} == wanted
+    (device,) = (thing for thing in after if thing.uid.startswith("mqtt:topic:"))
+    assert device.settings["payloadAvailable"] == "true"
+    assert home_of(written, parse("5"))[0] == home
+
+
+def test_what_a_home_could_not_say_of_a_channel_stays_a_link() -> None:
+    home, _ = home_of({"a.items": PLAIN_ITEMS, "a.things": PLAIN_THINGS}, parse("5"))
+    for name, uid in (("Lit", "mqtt:topic:lab:plain:dim"), ("Far", "mqtt:topic:lab:odd:far")):
+        assert (home.items[name].mqtt, list(home.items[name].channels)) == (None, [uid])
 
 
 def test_what_was_imported_can_be_generated_and_imported_again() -> None:
