@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -19,6 +20,7 @@ if TYPE_CHECKING:  # the grammars and HTTP, for these commands alone: every proc
     from services.openhab.site import Broker, BusDesign, Camera
 
 DESIGNS = ("dsl", "js", "links")
+TLS_PORT = 8883  # of mosquitto/tls.conf
 SERVICE = re.compile(r"[a-z0-9]+")  # of OpenHAB's persistence: it becomes the name of a file
 app = typer.Typer(no_args_is_help=True, help="OpenHAB's files: write them, check them, make a home.yaml of them.")
 OpenHab = Annotated[str, typer.Option("--openhab", help="2.5, 3, 4, 5, or a release such as 4.2.")]
@@ -31,6 +33,7 @@ def generate_(
     bus: Annotated[str, typer.Option(help="Rules in OpenHAB's language (dsl) or JavaScript (js), or links.")] = "dsl",
     persistence: Annotated[str, typer.Option(help="OpenHAB's own: jdbc, mysql, or none.")] = "jdbc",
     broker: Annotated[str | None, typer.Option(help="host:port of the broker as OpenHAB reaches it.")] = None,
+    tls: Annotated[bool, typer.Option("--tls", help="By TLS, as from another machine; port 8883.")] = False,
     diff: Annotated[bool, typer.Option("--diff", help="Show what would change, and change nothing.")] = False,
     config: Config = CONFIG,
 ) -> None:
@@ -48,7 +51,7 @@ def generate_(
     apartment = load(config, ())
     known = folders.taken(out, version) if out.is_dir() else {}
     site = Site(
-        apartment.home, version, _cameras(apartment), _broker(apartment, broker), cast("BusDesign", bus),
+        apartment.home, version, _cameras(apartment), _broker(apartment, broker, tls=tls), cast("BusDesign", bus),
         None if persistence == "none" else persistence, frozenset(known),
     )  # fmt: skip
     plan = folders.plan(out, files(site))
@@ -75,14 +78,38 @@ def _tell(plan: Plan) -> None:
     typer.echo(f"{len(plan.wanted) - len(plan.written) - len(plan.foreign)} files were right already.")
 
 
-def _broker(apartment: Apartment, text: str | None) -> Broker:
+def _broker(apartment: Apartment, text: str | None, *, tls: bool) -> Broker:
     from services.openhab.site import Broker
 
     host, _, port = (text or "").rpartition(":") if text and ":" in text else (text or "", "", "")
     if port and not port.isdigit():
         raise ConfigError([f"--broker: expected host:port, got {text!r}"])
     settings = apartment.bus
-    return Broker(host or settings.host, int(port) if port else settings.port, settings.tls is not None)
+    usual = TLS_PORT if tls and settings.tls is None else settings.port
+    secure = tls or settings.tls is not None
+    return Broker(
+        host or settings.host, int(port) if port else usual, secure, public_key=_public_key() if secure else None
+    )
+
+
+def _public_key() -> str | None:
+    """The hash of our broker's public key, by which OpenHAB is to know it; None where its certificate is not here."""
+    from services.credentials import certificates
+    from services.credentials.folder import Folder
+
+    named = os.environ.get("APARTMENT_SECRETS")
+    folder = Folder(Path(named).parent if named else secret_store.home())
+    try:
+        pair = folder.pair("broker")
+    except OSError as error:
+        text = f"{folder.path / 'broker'}: expected a certificate that can be read, got {error.strerror}"
+        raise ConfigError([text]) from error
+    if pair is None:
+        typer.echo(
+            f"{folder.path / 'broker'}: no certificate, so OpenHAB will trust the first one that it sees", err=True
+        )
+        return None
+    return certificates.pin(pair.certificate)
 
 
 def _cameras(apartment: Apartment) -> tuple[Camera, ...]:

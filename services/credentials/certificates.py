@@ -5,6 +5,7 @@ Not here: where the files go, `folder.py`. The only file that knows the library.
 
 from __future__ import annotations
 
+import hashlib
 import ipaddress
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -43,10 +44,13 @@ def authority(name: str, now: datetime) -> Pair:
     return _pair(builder.sign(key, hashes.SHA256()), key)
 
 
-def server(signer: Pair, name: str, hosts: Sequence[str], now: datetime) -> Pair:
-    """A certificate for a server that is reached by these names and addresses, with a key of its own."""
+def server(signer: Pair, name: str, hosts: Sequence[str], now: datetime, old: Pair | None = None) -> Pair:
+    """A certificate for a server that is reached by these names and addresses, with a new key or that of the `old` one.
+
+    Who knows a server by its key alone, as OpenHAB does, knows it after a renewal too.
+    """
     issuer, signing = _certificate(signer), _key(signer)
-    key = ec.generate_private_key(ec.SECP256R1())
+    key = _kept(old) or ec.generate_private_key(ec.SECP256R1())
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
     builder = (
         _builder(subject, issuer.subject, key.public_key(), now, SERVER_DAYS)
@@ -68,6 +72,13 @@ def hosts(certificate: str) -> list[str]:
     """The names and addresses that a server's certificate (PEM) is for."""
     names = _read(certificate).extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     return [str(one.value) for one in names]
+
+
+def pin(certificate: str) -> str:
+    """The hash of a certificate's (PEM) public key, in the form that OpenHAB's MQTT binding compares."""
+    key = _read(certificate).public_key()
+    told = key.public_bytes(serialization.Encoding.DER, serialization.PublicFormat.SubjectPublicKeyInfo)
+    return f"SHA-256:{hashlib.sha256(told).hexdigest().upper()}"
 
 
 def _builder(
@@ -125,6 +136,12 @@ def _read(certificate: str) -> x509.Certificate:
 
 def _certificate(pair: Pair) -> x509.Certificate:
     return _read(pair.certificate)
+
+
+def _kept(old: Pair | None) -> ec.EllipticCurvePrivateKey | None:
+    """The key of an earlier certificate, where it is one of our kind."""
+    key = serialization.load_pem_private_key(old.key.encode(), password=None) if old is not None else None
+    return key if isinstance(key, ec.EllipticCurvePrivateKey) else None
 
 
 def _key(pair: Pair) -> ec.EllipticCurvePrivateKey:

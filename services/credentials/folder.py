@@ -137,7 +137,7 @@ def _fill_certificates(folder: Folder, hosts: Sequence[str], now: datetime, *, f
 
 
 def renew(folder: Folder, within: timedelta, now: datetime) -> Iterator[str]:
-    """New certificates for the servers whose own ends within that time, for the same names; the authority stays."""
+    """New certificates for the servers whose own ends within that time: same names and keys; the authority stays."""
     signer = folder.pair(AUTHORITY)
     if signer is None:
         raise ConfigError([f"{folder.authority}: expected a certificate, got nothing: apartment secrets init"])
@@ -146,7 +146,7 @@ def renew(folder: Folder, within: timedelta, now: datetime) -> Iterator[str]:
     for name in SERVERS:
         old = folder.pair(name)
         if old is not None and certificates.ends(old.certificate) < now + within:
-            fresh = certificates.server(signer, name, certificates.hosts(old.certificate), now)
+            fresh = certificates.server(signer, name, certificates.hosts(old.certificate), now, old)
             folder.keep_pair(name, fresh)
             yield f"{folder.path / name}: renewed until {certificates.ends(fresh.certificate):%Y-%m-%d}"
 

@@ -44,6 +44,7 @@ class Broker:
     port: int = 1883
     secure: bool = False
     id: str = "apartment"
+    public_key: str | None = None  # its hash, where it is known: `SHA-256:...`
 
     @property
     def uid(self) -> str:

@@ -41,8 +41,10 @@ def bridge(site: Site) -> ThingLine:
         "lwtQos": 1,
         "lwtRetain": True,
     }
-    if site.broker.secure:  # a pinned certificate would shut the broker out when it is renewed
-        settings |= {"certificatepin": False, "publickeypin": False}
+    if site.broker.secure:  # without a pin the binding takes any certificate; a renewed one of ours has the same key
+        settings |= {"certificatepin": False, "publickeypin": True}
+        if site.broker.public_key is not None:
+            settings["publickey"] = site.broker.public_key
     if site.version.major >= 3:
         settings["enableDiscovery"] = False
     if site.version.has_birth:

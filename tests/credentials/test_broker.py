@@ -24,7 +24,7 @@ from services import access
 from services.bus import Message
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
-from services.credentials import passwords
+from services.credentials import certificates, passwords
 from services.credentials.folder import Folder, fill, renew
 from services.peers import answers, free_port, program, running, wait_until
 from tests.credentials.rights import CAMERAS, HEARD, SAID, STRANGE, Case, cases, may, of_devices
@@ -309,3 +309,4 @@ def test_a_renewed_certificate_is_shown_after_a_reload_and_nobody_is_thrown_out(
         wait_until(lambda: shown() == pair.certificate.strip(), "the new certificate", LIMIT_S)
         assert stays.client.is_connected()
     assert shown() != before
+    assert certificates.pin(shown()) == certificates.pin(before), "by which OpenHAB knows the broker"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import ssl
@@ -73,11 +74,15 @@ def test_a_second_time_nothing_changes_but_what_was_missing_is_made(folder: Fold
 
 def test_force_makes_all_anew_but_what_was_brought(folder: Folder) -> None:
     folder.keep({**folder.secrets(), "CAMERA_IP1_PASSWORD": "of the camera"})
-    before, signer = folder.secrets(), folder.pair("authority")
+    before, signer, server = folder.secrets(), folder.pair("authority"), folder.pair("broker")
     list(fill(folder, CONFIG, HOSTS, NOW, force=True))
     after = folder.secrets()
     assert {name for name in after if after[name] == before[name]} == {"CAMERA_IP1_PASSWORD"}
     assert folder.pair("authority") != signer
+    fresh = folder.pair("broker")
+    assert server is not None
+    assert fresh is not None
+    assert fresh.key != server.key
 
 
 def test_a_certificate_is_renewed_when_it_ends_soon_and_the_authority_stays(folder: Folder) -> None:
@@ -89,7 +94,8 @@ def test_a_certificate_is_renewed_when_it_ends_soon_and_the_authority_stays(fold
     assert len(list(renew(folder, month, later))) == 3
     fresh = folder.pair("broker")
     assert fresh is not None
-    assert fresh.key != old.key
+    assert (fresh.key, certificates.pin(fresh.certificate)) == (old.key, certificates.pin(old.certificate))
+    assert fresh.certificate != old.certificate
     assert certificates.ends(fresh.certificate) > later + 20 * month
     assert certificates.hosts(fresh.certificate) == HOSTS
     assert folder.pair("authority") == signer
@@ -111,6 +117,17 @@ def test_openssl_accepts_the_certificates_for_these_names_and_no_others(folder: 
     context = ssl.create_default_context(cafile=str(folder.authority))
     context.verify_flags |= ssl.VERIFY_X509_STRICT
     context.load_cert_chain(folder.path / "dashboard/server.crt", folder.path / "dashboard/server.key")
+
+
+def test_a_key_is_known_by_the_hash_that_openssl_makes_of_it(folder: Folder) -> None:
+    openssl = program("openssl", "openssl")
+    file = str(folder.path / "broker/server.crt")
+    key = subprocess.run([openssl, "x509", "-in", file, "-pubkey", "-noout"], capture_output=True, check=True).stdout
+    plain = [openssl, "pkey", "-pubin", "-outform", "der"]
+    der = subprocess.run(plain, input=key, capture_output=True, check=True).stdout
+    pair = folder.pair("broker")
+    assert pair is not None
+    assert certificates.pin(pair.certificate) == "SHA-256:" + hashlib.sha256(der).hexdigest().upper()
 
 
 def test_a_repository_is_no_place_for_secrets(tmp_path: Path) -> None:

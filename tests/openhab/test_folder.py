@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ from typer.testing import CliRunner
 
 from services.__main__ import app
 from services.config import load
+from services.credentials import certificates
+from services.credentials.folder import Folder, fill
 from services.errors import ConfigError
 
 SHIPPED = Path(__file__).parents[2] / "config"
@@ -116,6 +119,39 @@ def test_nothing_is_written_outside_of_the_folder(config: Path, tmp_path: Path) 
     with pytest.raises(ConfigError, match="--persistence: expected the name of a service"):
         generate(config, tmp_path / "in" / "openhab", "--persistence", "../../escaped")
     assert not list(tmp_path.rglob("escaped*"))
+
+
+@pytest.mark.parametrize(
+    ("words", "host", "port"),
+    [
+        (("--broker", "apartment.lan", "--tls"), "apartment.lan", 8883),
+        (("--broker", "apartment.lan:18883", "--tls"), "apartment.lan", 18883),
+        (("--tls",), "127.0.0.1", 8883),
+    ],
+)
+def test_an_openhab_on_another_machine_comes_by_tls_and_knows_the_brokers_key(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], host: str, port: int
+) -> None:
+    folder = Folder(tmp_path / "secrets")
+    list(fill(folder, config, ["apartment.lan"], datetime.now(UTC)))
+    pair = folder.pair("broker")
+    assert pair is not None
+    monkeypatch.setenv("APARTMENT_SECRETS", str(folder.path / "secrets.yaml"))
+    assert generate(config, tmp_path / "openhab", *words)[0] == 0
+    text = (tmp_path / "openhab/things/apartment.things").read_text(encoding="utf-8")
+    for line in (f'host="{host}"', f"port={port}", "secure=true", "publickeypin=true", "certificatepin=false",
+                 f'publickey="{certificates.pin(pair.certificate)}"'):  # fmt: skip
+        assert f"    {line},\n" in text, line
+
+
+def test_where_the_brokers_certificate_is_not_there_that_is_told(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("APARTMENT_SECRETS", str(tmp_path / "secrets.yaml"))
+    (tmp_path / "secrets.yaml").write_text("")
+    code, said = generate(config, tmp_path / "openhab", "--tls")
+    assert code == 0
+    assert "no certificate, so OpenHAB will trust the first one that it sees" in said
 
 
 def test_files_of_a_camera_that_went_are_removed(config: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import get_args
 
 import pytest
@@ -10,10 +11,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from services.apartment.home import Home
-from services.openhab.check import check
+from services.openhab.check import check, read_site
 from services.openhab.generate import MARK, files
 from services.openhab.importing import home_of
-from services.openhab.site import BusDesign, Camera, Site
+from services.openhab.lines import Setting
+from services.openhab.site import Broker, BusDesign, Camera, Site
 from services.openhab.versions import parse
 from tests.openhab.homes import CAMERAS, homes, shipped, sized
 
@@ -76,6 +78,21 @@ def test_the_broker_is_told_quickly_and_surely() -> None:
                    'shutdownTopic="service/openhab/status"', 'separator="#"'):  # fmt: skip
         assert wanted in things
     assert "birthTopic" not in files(Site(shipped(), parse("3")))["things/apartment.things"]
+
+
+@pytest.mark.parametrize("series", SERIES)
+def test_openhab_knows_a_broker_that_it_meets_by_tls_by_its_key(series: str) -> None:
+    def bridge(broker: Broker) -> Mapping[str, Setting]:
+        written = files(Site(shipped(), parse(series), broker=broker))
+        assert faults(written, SERIES[series][0]) == []
+        site, _ = read_site(written, parse(series))
+        return next(thing.settings for thing in site.things[0][0] if thing.is_bridge)
+
+    known = bridge(Broker("apartment.lan", 8883, True, public_key="SHA-256:0A1B"))
+    assert (known["secure"], known["publickeypin"], known["publickey"]) == (True, True, "SHA-256:0A1B")
+    learnt = bridge(Broker("apartment.lan", 8883, True))
+    assert (learnt["secure"], learnt["publickeypin"], "publickey" in learnt) == (True, True, False)
+    assert {"publickeypin", "publickey"} & bridge(Broker()).keys() == set()
 
 
 def test_every_file_says_in_its_first_line_who_wrote_it() -> None:
