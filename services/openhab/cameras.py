@@ -6,7 +6,7 @@ Pictures come through our proxy, without an account in any address. Not here: ho
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from services import topics
 from services.openhab.alexa import modes
@@ -56,8 +56,8 @@ def _orders(camera: Camera) -> Iterator[Part]:
     yield _switch(camera, "mjpeg", "Stream", topics.CAMERA_STREAM.name(cam=cam), "$.mjpeg", "MJPEG")
     health = topics.DIAGNOSTICS.name(component=f"camera/{cam}")
     yield _switch(camera, "privacy", "Privacy", health, "$.values.lens_covered", "Privacy", ("on", "off"))
-    scan: dict[str, Setting] = {"commandTopic": _order(camera, "Scan"), "on": "True", "off": "False"}
-    yield Part("scan", "Scan", "switch", "Switch", "Scan for markers", scan, "switch", ("Switch",), False)
+    scan = _switch(camera, "scan", "Scan", topics.CAMERA_SCAN_STATE.name(cam=cam), "$.running", "Scan")
+    yield replace(scan, label="Scan for markers")
     move: dict[str, Setting] = {"commandTopic": _order(camera, "Move")}
     yield Part("move", "Move", "string", "String", "Turn", move, None, control, False)
     ask: dict[str, Setting] = {"commandTopic": topics.CAMERA_SNAPSHOT_GET.name(cam=cam), "on": "now", "off": "now"}

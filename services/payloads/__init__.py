@@ -186,9 +186,10 @@ class Audio(Payload):
 
 
 class ScanState(Payload):
-    """`camera/<cam>/scan/state`: `progress` goes from 0 to 1."""
+    """`camera/<cam>/scan/state`: `progress` goes from 0 to 1; `running` is the state as a switch shows it."""
 
     state: Literal["idle", "running", "done", "cancelled", "failed"]
+    running: bool = False
     scan: str | None = None
     targets: list[int] = []
     found: list[int] = []

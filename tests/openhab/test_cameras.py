@@ -86,3 +86,13 @@ def test_motion_goes_off_while_the_alarm_is_in_trouble(openhab: OpenHab) -> None
     flat.inbox.append(Message(HEARD, value=Heard(flat.now, lost="the network is cut")))
     flat.until(lambda: openhab.state("motion_value") == "-1")
     assert openhab.state("motion") == "OFF"
+
+
+def test_the_switch_of_a_scan_shows_it_while_it_runs_and_calls_it_off(openhab: OpenHab) -> None:
+    flat = openhab.flat
+    assert openhab.state("scan") == "OFF"
+    openhab.command("scan", "ON")
+    flat.until(lambda: openhab.state("scan") == "ON")
+    openhab.command("scan", "OFF")
+    flat.until(lambda: openhab.state("scan_state") == "cancelled")
+    assert openhab.state("scan") == "OFF"
