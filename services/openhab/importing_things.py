@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from services.apartment.home import MqttTopics
+from services.apartment.home import NO_MQTT, MqttTopics
 from services.openhab.lines import ChannelLine, ThingLine, identifier
+from services.states import base_type
 
 KINDS = {"zwave": "zwave", "mqtt": "mqtt"}  # others are virtual for us
 GENERIC = "mqtt:topic:"
@@ -28,7 +29,8 @@ def assign(items: dict[str, dict[str, Any]], things: Iterable[ThingLine]) -> dic
         found.setdefault(key, _device(owner, known.get(owner)))
         fields["thing"] = key
         channel = _channel(known.get(owner), id)
-        if owner.startswith(GENERIC) and channel is not None and not fields["channels"][uid]:
+        fits = base_type(fields["type"]) not in NO_MQTT
+        if owner.startswith(GENERIC) and channel is not None and not fields["channels"][uid] and fits:
             fields["mqtt"] = _topics(channel)
             del fields["channels"][uid]
     return found

@@ -21,6 +21,10 @@ def example() -> Home:
     return Home.model_validate(yaml.safe_load(EXAMPLE.read_text(encoding="utf-8")))
 
 
+ON_MQTT = {"things": {"a": {"label": "A", "kind": "mqtt"}}}
+TOPICS = {"state": "dev/a", "command": "dev/a/set"}
+
+
 def home(**changes: Any) -> Home:
     """A home of one lamp, with changes."""
     lamp = {"type": "Switch", "label": "Lamp", "thing": "lamp", "groups": ["gLights"]}
@@ -84,6 +88,8 @@ def test_a_home_without_faults_has_none() -> None:
         ({"items": {"A": item(thing="toaster")}}, ("items", "A", "thing"), "toaster"),
         ({"items": {"A": item(room="attic")}}, ("items", "A", "room"), "attic"),
         ({"items": {"A": item(groups=["gLights", "gNone"])}}, ("items", "A", "groups"), "gNone"),
+        (ON_MQTT | {"items": {"A": item(type="Player", thing="a", mqtt=TOPICS)}}, ("items", "A", "mqtt"), "a Player"),
+        (ON_MQTT | {"items": {"A": item(type="Call", thing="a", mqtt=TOPICS)}}, ("items", "A", "mqtt"), "a Call"),
         ({"items": {"1A": item()}}, ("items", "1A"), "digit"),
         ({"items": {"A-B": item()}}, ("items", "A-B"), "digit"),
         ({"items": {"A\n": item()}}, ("items", "A\n"), "digit"),

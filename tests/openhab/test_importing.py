@@ -74,6 +74,15 @@ def test_a_generic_thing_becomes_a_plain_mqtt_device() -> None:
     assert (lamp.alexa.name, lamp.alexa.device) == ("Hall", "Light")
 
 
+def test_a_player_on_mqtt_keeps_its_link_which_is_told() -> None:
+    things = THINGS.replace("switch", "string").replace(', on="1", off="0"', "")
+    items = 'Player Lamp { channel="mqtt:topic:lab:hall:lamp" }'
+    home, found = home_of({"a.items": items, "a.things": things}, parse("5"))
+    assert [one.text for one in found] == ["expected an item that fits a string channel, got a Player"]
+    assert list(home.faults()) == []
+    assert list(home.items["Lamp"].channels) == ["mqtt:topic:lab:hall:lamp"]
+
+
 def test_what_was_imported_can_be_generated_and_imported_again() -> None:
     home, _ = home_of(LAB, parse("5"))
     written = files(Site(home, parse("5")))
