@@ -19,6 +19,7 @@ from services.states import ITEM_TYPES, base_type
 
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 NOT_A_NAME = "expected a name of letters, digits and _ that does not begin with a digit"
+NO_MQTT = ("Player", "Call")  # OpenHAB's MQTT binding has no channel whose states and commands are theirs
 GROUP_ROS = "ROS"  # the group whose members go to the robot, as in the report
 Strategy = Literal["everyChange", "everyUpdate", "restoreOnStartup"]  # when a state is stored, in OpenHAB's words
 Value = bool | int | float | str  # of a setting in OpenHAB's files
@@ -209,6 +210,8 @@ class Home(Section):
             yield ("items", name, "thing"), f"expected one of the things, got {item.thing!r}"
         if item.room is not None and item.room not in self.rooms:
             yield ("items", name, "room"), f"expected one of the rooms, got {item.room!r}"
+        if item.mqtt is not None and base_type(item.type) in NO_MQTT:
+            yield ("items", name, "mqtt"), f"expected none for a {item.type}, OpenHAB has no MQTT channel for it"
         for group in item.groups:
             if group not in self.groups and group != GROUP_ROS:
                 yield ("items", name, "groups"), f"expected one of the groups, got {group!r}"

@@ -84,7 +84,7 @@ class Bulletin:
             return None
         pan, tilt, zoom = self.reading.pan, self.reading.tilt, self.reading.zoom
         place = None if self.turning else self.places.at(self.reading)
-        return Position(pan=pan, tilt=tilt, zoom=zoom, moving=self.turning, place=place)
+        return Position(pan=pan, tilt=tilt, zoom=zoom, moving=self.turning, place=place, place_name=place or "")
 
     def say(self, topic: topics.Topic, payload: BaseModel) -> None:
         """Publishes a state unless it is what was said last."""
@@ -134,6 +134,7 @@ class Bulletin:
             "http_latency_ms": f"{1000 * self.health.latency:.0f}",
             "model": identity.model,
             "firmware": identity.version,
+            "lens_covered": "on" if self.facts.values.get("privacy") == "on" else "off",  # privacy may be none
             **(self.video.values() if self.video else {}),
             **{name: str(count) for name, count in counters.items()},
             **self.facts.values,

@@ -39,7 +39,7 @@ def generate_(
 ) -> None:
     """Write OpenHAB's files from the model of the home. Files of others are never touched."""
     from services.openhab import folder as folders
-    from services.openhab.generate import files
+    from services.openhab.generate import files, left_out
     from services.openhab.site import Site
     from services.openhab.versions import parse
 
@@ -64,7 +64,7 @@ def generate_(
         _tell(plan)
     for path in plan.foreign:
         typer.echo(f"{out / path}: not ours, left as it is", err=True)
-    for name in sorted(set(known) & {*site.home.items, *site.home.groups, site.broker.uid}):
+    for name in left_out(site):
         typer.echo(f"{name}: stands in {known[name]} already, left out of ours", err=True)
     if plan.foreign:
         raise typer.Exit(1)

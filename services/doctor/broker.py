@@ -1,29 +1,31 @@
-"""The broker: whether it is there, lets us in, speaks MQTT 5, keeps messages for those who come later, and is quick."""
+"""The broker: whether it is there, lets us in, speaks MQTT 5, keeps what it should and no commands, and is quick."""
 
 from __future__ import annotations
 
+import shlex
 import socket
 import ssl
 import statistics
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-from services.bus import connection
+from services.bus import Message, connection, topic_matches
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.client import Client
 from services.config import BusSettings
 from services.doctor.findings import Finding, ill, well
 from services.process import address
-from services.topics import SERVICE_STATUS
+from services.topics import HOME_COMMAND, HOME_SET, SERVICE_STATUS
 
 PART = "broker"
 ACCOUNT = "operator"
 ANSWER_S = 5.0
 BURSTS, BURST = 9, 3
+OBEYED = (HOME_COMMAND.filter, HOME_SET.filter)  # by OpenHAB, whose binding tells no rule that a message was kept
 SLOW_S = 0.03  # half of the bursts: Nagle and delayed acknowledgements cost 40 ms each time, a busy machine not half
 
 
@@ -96,16 +98,25 @@ def _used(at: Address) -> Iterator[Finding]:
                 yield ill(PART, told, "the access list is not of this version: apartment install, or topics --acl FILE")
                 return
             with _client(at) as late:
-                late.subscribe(SERVICE_STATUS.filter)
+                late.subscribe(*OBEYED, SERVICE_STATUS.filter)  # in this order: our own word comes behind kept commands
                 if not _comes(late, None, topic, kept=True):
                     told = "kept messages do not come to those who subscribe later by a wildcard"
                     yield ill(PART, told, "mosquitto 2; RabbitMQ cannot do it, NATS needs JetStream")
                     return
                 yield well(PART, "it keeps states for those who come later")
+                yield from _kept_commands(late.seen)
                 yield _speed(speaker, late)
         finally:
             speaker.say(topic, b"", retain=True)
             speaker.pump(0.1)
+
+
+def _kept_commands(heard: Iterable[Message]) -> Iterator[Finding]:
+    """Each one does what it says again whenever OpenHAB connects."""
+    for one in heard:
+        if one.retain and any(topic_matches(wanted, one.topic) for wanted in OBEYED):
+            mend = f"as {ACCOUNT}: mosquitto_pub -r -n -t {shlex.quote(one.topic)}"
+            yield ill(PART, f"it keeps a command, which OpenHAB obeys at every start: {one.topic}", mend)
 
 
 def _comes(listener: Client, speaker: Client | None, topic: str, *, kept: bool | None) -> bool:

@@ -6,7 +6,7 @@ Pictures come through our proxy, without an account in any address. Not here: ho
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from services import topics
 from services.openhab.alexa import modes
@@ -47,7 +47,7 @@ def _orders(camera: Camera) -> Iterator[Part]:
     cam, control = camera.name, ("Control",)
     place: dict[str, Setting] = {
         "stateTopic": topics.CAMERA_POSITION.name(cam=cam),
-        "transformationPattern": "JSONPATH:$.place",
+        "transformationPattern": "JSONPATH:$.place_name",  # a null would leave the place that it has left
         "commandTopic": _order(camera, "Goto"),
     }
     options = {name: name for name in camera.places}
@@ -55,9 +55,9 @@ def _orders(camera: Camera) -> Iterator[Part]:
                (*description(options=options), *_voice(camera, options)))  # fmt: skip
     yield _switch(camera, "mjpeg", "Stream", topics.CAMERA_STREAM.name(cam=cam), "$.mjpeg", "MJPEG")
     health = topics.DIAGNOSTICS.name(component=f"camera/{cam}")
-    yield _switch(camera, "privacy", "Privacy", health, "$.values.privacy", "Privacy", ("on", "off"))
-    scan: dict[str, Setting] = {"commandTopic": _order(camera, "Scan"), "on": "True", "off": "False"}
-    yield Part("scan", "Scan", "switch", "Switch", "Scan for markers", scan, "switch", ("Switch",), False)
+    yield _switch(camera, "privacy", "Privacy", health, "$.values.lens_covered", "Privacy", ("on", "off"))
+    scan = _switch(camera, "scan", "Scan", topics.CAMERA_SCAN_STATE.name(cam=cam), "$.running", "Scan")
+    yield replace(scan, label="Scan for markers")
     move: dict[str, Setting] = {"commandTopic": _order(camera, "Move")}
     yield Part("move", "Move", "string", "String", "Turn", move, None, control, False)
     ask: dict[str, Setting] = {"commandTopic": topics.CAMERA_SNAPSHOT_GET.name(cam=cam), "on": "now", "off": "now"}
@@ -90,7 +90,7 @@ def _states(camera: Camera) -> Iterator[Part]:
     """What it says."""
     cam = camera.name
     motion = topics.CAMERA_MOTION.name(cam=cam)
-    seen = {**_from(motion, "$.value"), "on": "1", "off": "0"}  # -1, an alarm in trouble, is in the number beside it
+    seen = {**_from(motion, "$.seen"), "on": "true", "off": "false"}  # an alarm in trouble is in the number beside it
     yield Part("motion", "Motion", "switch", "Switch", "Motion", seen, "motion", ("Status", "Presence"))
     yield _shown("motion_value", "Motion_Value", "number", "Number", "Motion alarm", motion, "$.value", "motion")
     yield _shown("status", "Status", "string", "String", "Status", topics.CAMERA_STATUS.name(cam=cam), "$.state")

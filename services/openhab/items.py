@@ -24,9 +24,8 @@ OLD_DAYS = re.compile(r"([0-9]+)d(,.*)?")
 
 
 def lines(site: Site) -> list[ItemLine]:
-    """Every item of the home's file, but those whose names other files have taken."""
-    found = [*_groups(site), *_rooms(site), *_things(site), *_items(site)]
-    return [line for line in found if line.name not in site.taken]
+    """Every item of the home's file."""
+    return [*_groups(site), *_rooms(site), *_things(site), *_items(site)]
 
 
 def _groups(site: Site) -> Iterator[ItemLine]:

@@ -1,6 +1,7 @@
 """Plain MQTT devices of the home as generic topic things, and the bus without rules: two channels per item. Pure.
 
-Without rules OpenHAB cannot say states of contacts, calls and pictures: the binding never publishes them.
+Without rules OpenHAB cannot say states of contacts, calls, players and pictures: the binding never publishes them. For
+players and calls it has no channel at all: OpenHAB takes PLAY for no text, and drops it on a channel of texts.
 """
 
 from __future__ import annotations
@@ -26,9 +27,7 @@ CHANNEL_TYPES = {
     "Color": "color",
     "DateTime": "datetime",
     "Location": "location",
-    "Player": "string",
     "Image": "image",
-    "Call": "string",
 }
 COLOR_MODES = ("colorMode", "color_mode")  # the second is 2.x's word
 SILENT = ("Contact", "Call", "Image")  # what the binding never publishes
@@ -89,7 +88,9 @@ def bus_thing(site: Site) -> ThingLine:
     """The bus without rules: what comes as a command goes to the item, what the item says goes out, kept."""
     channels: list[ChannelLine] = []
     for name, item in site.home.ros_items.items():
-        kind = CHANNEL_TYPES[base_type(item.type)]
+        kind = CHANNEL_TYPES.get(base_type(item.type))
+        if kind is None:
+            continue
         state: dict[str, Setting] = {"stateTopic": topics.HOME_SET.name(item=name)}
         if kind == "color":
             state["color_mode" if site.version.major == 2 else "colorMode"] = "HSB"
@@ -106,6 +107,8 @@ def bus_thing(site: Site) -> ThingLine:
 def link_uids(site: Site, name: str, item: Item) -> Iterator[Metadata]:
     """The two links of an item to the bus without rules."""
     uid = f"mqtt:topic:{site.broker.id}:{BUS}"
+    if base_type(item.type) not in CHANNEL_TYPES:
+        return
     if base_type(item.type) not in SILENT:
         yield Metadata("channel", f"{uid}:{channel_id(name)}", {"profile": "follow"})
     if base_type(item.type) != "Image":

@@ -54,7 +54,7 @@ class Broker:
 
 @dataclass(frozen=True)
 class Site:
-    """Everything that the files are made of. `taken`: names that files of others define already, which are left out."""
+    """Everything that the files are made of. `taken`: names and UIDs that files of others define, left out of ours."""
 
     home: Home
     version: Version
@@ -74,7 +74,7 @@ class Names:
     """Names of groups for rooms and things, and of a camera's items: none twice, none that the home has."""
 
     def __init__(self, site: Site) -> None:
-        self._used = {*site.home.items, *site.home.groups, GROUP_ROS, ALL, STATUS_ITEM, *site.taken}
+        self._used = {*site.home.items, *site.home.groups, GROUP_ROS, ALL, STATUS_ITEM}
         self.rooms = {key: self._new(f"gRoom_{identifier(key)}") for key in site.home.rooms}
         self.things = {key: self._new(f"gThing_{identifier(key)}") for key in site.home.things}
         self.devices = self._device_ids(site)

@@ -19,9 +19,8 @@ COMMANDS, UPDATES = "busCommand", "busSet"
 
 
 def lines(site: Site) -> list[ThingLine]:
-    """Every thing of the home's file, but those that other files have."""
-    found = [bridge(site), *mqtt.devices(site), *([mqtt.bus_thing(site)] if site.bus == "links" else [])]
-    return [thing for thing in found if thing.uid not in site.taken]
+    """Every thing of the home's file."""
+    return [bridge(site), *mqtt.devices(site), *([mqtt.bus_thing(site)] if site.bus == "links" else [])]
 
 
 def bridge(site: Site) -> ThingLine:

@@ -105,13 +105,17 @@ class Order(Payload):
 
 
 class Position(Payload):
-    """`camera/<cam>/position`: readings in degrees, zoom as a level; `place` when one is under the lens."""
+    """`camera/<cam>/position`: readings in degrees, zoom as a level; `place` when one is under the lens.
+
+    `place_name` is the same as a text that may be empty, for those who drop what is null, as OpenHAB does.
+    """
 
     pan: Real
     tilt: Real
     zoom: Real
     moving: bool = False
     place: str | None = None
+    place_name: str = ""
 
 
 class PositionSet(Payload):
@@ -163,10 +167,14 @@ class Places(RootModel[dict[str, Place]]):
 
 
 class Motion(Payload):
-    """`camera/<cam>/motion`: 1 for 15 s after motion, 0 otherwise, -1 when the alarm is in trouble."""
+    """`camera/<cam>/motion`: 1 for 15 s after motion, 0 otherwise, -1 when the alarm is in trouble.
+
+    `seen`: whether it is 1, for a switch, which cannot be in trouble.
+    """
 
     value: Literal[0, 1, -1]
     since: str
+    seen: bool = False
 
 
 class Audio(Payload):
@@ -178,9 +186,10 @@ class Audio(Payload):
 
 
 class ScanState(Payload):
-    """`camera/<cam>/scan/state`: `progress` goes from 0 to 1."""
+    """`camera/<cam>/scan/state`: `progress` goes from 0 to 1; `running` is the state as a switch shows it."""
 
     state: Literal["idle", "running", "done", "cancelled", "failed"]
+    running: bool = False
     scan: str | None = None
     targets: list[int] = []
     found: list[int] = []

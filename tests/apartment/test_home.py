@@ -21,6 +21,10 @@ def example() -> Home:
     return Home.model_validate(yaml.safe_load(EXAMPLE.read_text(encoding="utf-8")))
 
 
+ON_MQTT = {"things": {"a": {"label": "A", "kind": "mqtt"}}}
+TOPICS = {"state": "dev/a", "command": "dev/a/set"}
+
+
 def home(**changes: Any) -> Home:
     """A home of one lamp, with changes."""
     lamp = {"type": "Switch", "label": "Lamp", "thing": "lamp", "groups": ["gLights"]}
@@ -87,6 +91,8 @@ def test_a_home_without_faults_has_none() -> None:
         ({"items": {"A": item(mqtt={"state": "a"})}}, ("items", "A", "mqtt"), "got none"),
         ({"items": {"A": item(thing="lamp", mqtt={"state": "a"})}}, ("items", "A", "mqtt"), "'lamp' of kind zwave"),
         ({"things": {"lamp": {"label": "x", "mqtt": {"availability": "a"}}}}, ("things", "lamp", "mqtt"), "got zwave"),
+        (ON_MQTT | {"items": {"A": item(type="Player", thing="a", mqtt=TOPICS)}}, ("items", "A", "mqtt"), "a Player"),
+        (ON_MQTT | {"items": {"A": item(type="Call", thing="a", mqtt=TOPICS)}}, ("items", "A", "mqtt"), "a Call"),
         ({"items": {"1A": item()}}, ("items", "1A"), "digit"),
         ({"items": {"A-B": item()}}, ("items", "A-B"), "digit"),
         ({"items": {"A\n": item()}}, ("items", "A\n"), "digit"),

@@ -81,7 +81,7 @@ def test_since_tells_when_the_value_began() -> None:
     room.hear(START)
     said = room.watch.tick(room.now, turning=False)
     assert said is not None
-    assert json.loads(said.model_dump_json()) == {"value": 1, "since": "1970-01-01T00:16:41.000Z"}
+    assert json.loads(said.model_dump_json()) == {"value": 1, "since": "1970-01-01T00:16:41.000Z", "seen": True}
 
 
 def test_a_lost_stop_ends_by_asking_the_camera() -> None:

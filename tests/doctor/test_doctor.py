@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -17,6 +18,8 @@ from typing import Any
 import pytest
 
 from services import access
+from services.client import connected
+from services.config import BusSettings
 from services.doctor import broker as at_broker
 from services.doctor import machine, others
 from services.doctor.examination import examine
@@ -162,6 +165,25 @@ def test_a_broker_without_nodelay(patient: Patient, tmp_path: Path) -> None:
         patient.told["bus"] |= {"port": slow.port, "accounts": slow.passwords}
         findings = [one for one in examine(patient.file(), patient.environment) if not one.good]
     only(findings, "broker", "ms for 3 messages", "set_tcp_nodelay true")
+
+
+@pytest.mark.mosquitto
+def test_commands_that_the_broker_keeps(patient: Patient, broker: mosquitto.Broker) -> None:
+    settings = BusSettings(port=broker.port, accounts={"operator": broker.passwords["operator"]})
+    topics = [f"home/{item}/{verb}" for item in ("Blind of 'A'", "Lamp") for verb in ("command", "set")]
+    with connected(settings, ("home/+/command", "home/+/set")) as client:
+
+        def kept(payload: bytes) -> list[Finding]:
+            for topic in topics:
+                client.say(topic, payload, retain=True)
+            client.until(lambda one: (one.topic, one.payload) == (topics[-1], payload))
+            return patient.ill()
+
+        found = kept(b"ON")
+        assert kept(b"") == []
+    assert {(one.part, "OpenHAB obeys" in one.what) for one in found} == {("broker", True)}
+    assert sorted(one.what.rpartition(": ")[2] for one in found) == topics
+    assert sorted(shlex.split(one.mend)[-4:] for one in found) == [["-r", "-n", "-t", topic] for topic in topics]
 
 
 @pytest.mark.mosquitto

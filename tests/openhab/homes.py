@@ -9,7 +9,7 @@ import yaml
 from hypothesis import strategies as st
 
 from services.apartment import forms
-from services.apartment.home import Home
+from services.apartment.home import NO_MQTT, Home
 from services.openhab.site import Camera
 
 SHIPPED = Path(__file__).parents[2] / "config" / "home.yaml"
@@ -90,6 +90,8 @@ def items(draw: st.DrawFn, rooms: list[str], things: dict[str, str], groups: lis
     fields["channels"] = draw(
         st.sampled_from([{}, {"zwave:device:c:node2:switch": {}}, {"a:b:c:d#e-f": {"profile": "follow", "x": -1.5}}])
     )
+    if fields["type"] in NO_MQTT:
+        fields["mqtt"] = None
     return fields
 
 

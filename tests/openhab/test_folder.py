@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from datetime import UTC, datetime
 from pathlib import Path
@@ -152,6 +153,29 @@ def test_where_the_brokers_certificate_is_not_there_that_is_told(
     code, said = generate(config, tmp_path / "openhab", "--tls")
     assert code == 0
     assert "no certificate, so OpenHAB will trust the first one that it sees" in said
+
+
+def test_what_others_have_of_a_camera_or_a_room_is_left_out_and_the_rest_keeps_its_names(
+    config: Path, tmp_path: Path
+) -> None:
+    clean, out = tmp_path / "clean", tmp_path / "openhab"
+    generate(config, clean)
+    shutil.copytree(clean, out)
+    mark, camera = (out / "things/apartment_ip1.things").read_text().split("\n", 1)
+    (out / "things/mine.things").write_text(camera)
+    (out / "items/mine.items").write_text('String Ip1_Place "mine" (Ip1)\nGroup gRoom_kitchen "mine"\n')
+    code, said = generate(config, out)
+    assert code == 0
+    for name in ("Ip1_Place", "gRoom_kitchen", "mqtt:topic:apartment:camera_ip1"):
+        assert f"{name}: stands in {out}" in said
+    assert (out / "things/apartment_ip1.things").read_text().strip() == mark
+    for path, name in (("items/apartment.items", "gRoom_kitchen"), ("items/apartment_ip1.items", "Ip1_Place")):
+        lines = re.split(r"\n(?=\S)", (clean / path).read_text())
+        kept = [one for one in lines if not re.match(rf"\S+ {name}\b", one)]
+        assert len(kept) == len(lines) - 1
+        assert (out / path).read_text() == "\n".join(kept)
+    assert (out / "sitemaps/apartment.sitemap").read_text() == (clean / "sitemaps/apartment.sitemap").read_text()
+    assert run("check", out)[0] == 0
 
 
 def test_files_of_a_camera_that_went_are_removed(config: Path, tmp_path: Path) -> None:

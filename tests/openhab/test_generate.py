@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import get_args
 
 import pytest
+import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -135,6 +136,15 @@ def test_a_camera_shows_its_picture_through_our_proxy_while_the_stream_is_on() -
     camera = Camera("ip1", ("Kitchen",), (582,), "http://192.0.2.1:8081/camera/ip1/stream.mjpg")
     text = files(Site(shipped(), parse("5"), (camera,)))["sitemaps/apartment.sitemap"]
     assert 'url="http://192.0.2.1:8081/camera/ip1/stream.mjpg" encoding="mjpeg" visibility=[Ip1_Stream==ON]' in text
+
+
+def test_the_main_ui_shows_the_picture_as_an_image_while_the_stream_is_on() -> None:
+    widget = yaml.safe_load(files(Site(shipped(), parse("5"), CAMERAS))["widgets/apartment_ip1.yaml"])
+    parts = widget["slots"]["default"]
+    assert [(one["component"], one["config"]["item"]) for one in parts if "visible" in one["config"]] == [
+        ("oh-image", "Ip1_Stream_Url")
+    ]
+    assert parts[0]["config"]["visible"] == "=items.Ip1_Stream.state === 'ON'"
 
 
 def test_old_alexa_tags_are_for_the_second_series_only() -> None:

@@ -132,6 +132,15 @@ def test_what_a_home_could_not_say_of_a_channel_stays_a_link() -> None:
         assert (home.items[name].mqtt, list(home.items[name].channels)) == (None, [uid])
 
 
+def test_a_player_on_mqtt_keeps_its_link_which_is_told() -> None:
+    things = THINGS.replace("switch", "string").replace(', on="1", off="0"', "")
+    items = 'Player Lamp { channel="mqtt:topic:lab:hall:lamp" }'
+    home, found = home_of({"a.items": items, "a.things": things}, parse("5"))
+    assert [one.text for one in found] == ["expected an item that fits a string channel, got a Player"]
+    assert list(home.faults()) == []
+    assert list(home.items["Lamp"].channels) == ["mqtt:topic:lab:hall:lamp"]
+
+
 def test_what_was_imported_can_be_generated_and_imported_again() -> None:
     home, _ = home_of(LAB, parse("5"))
     written = files(Site(home, parse("5")))

@@ -107,7 +107,7 @@ class MotionWatch:
             self.begin(self._ask(), now)
         value = self._value(now) if online or not self._mute else -1
         if value is not None and (self._said is None or self._said.value != value):
-            self._said = Motion(value=value, since=stamp(now))
+            self._said = Motion(value=value, since=stamp(now), seen=value == 1)
         return self._said
 
     def _event(self, event: Event, at: float) -> None:

@@ -101,6 +101,7 @@ class Scan:
         found = [one for one in self.findings.seen if state != "running" or self.findings.found(one)]
         return ScanState(
             state=state,
+            running=state == "running",
             scan=self.name,
             targets=list(self.findings.targets),
             found=sorted(found),

@@ -52,24 +52,12 @@ ITEM_OF = {  # the base item type that a channel's states are of
     "colorRGB": "Color",
     "colorHSB": "Color",
 }
-FITS = {  # item types that a channel's states can be kept in as well
+FITS = {  # item types that a channel's states can be kept in as well; a text is no state of any other type
     "switch": ("String",),
     "contact": ("String", "Switch"),
     "number": ("String", "Dimmer", "Rollershutter"),
     "dimmer": ("Switch", "Number", "String", "Rollershutter"),
     "rollershutter": ("Dimmer", "Number", "String", "Switch"),
-    "string": (
-        "Switch",
-        "Contact",
-        "Number",
-        "DateTime",
-        "Player",
-        "Location",
-        "Call",
-        "Dimmer",
-        "Rollershutter",
-        "Color",
-    ),
     "datetime": ("String",),
     "location": ("String",),
     "color": ("Switch", "Dimmer", "Number", "String"),
