@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 import time
 from collections.abc import Iterator
@@ -12,9 +13,10 @@ from pathlib import Path
 
 import httpx
 import pytest
+import uvicorn
 from openapi_spec_validator import validate
 
-from services import peers, topics
+from services import dashboard, peers, topics
 from services.config import BusSettings
 from services.dashboard.sessions import FREE_TRIES
 from services.dashboard.settings import Tls
@@ -365,7 +367,9 @@ def test_over_tls_the_cookie_goes_over_tls_alone(tmp_path: Path) -> None:
         ca, cert, key = certificates(tmp_path / "ca", "our own CA")
     except peers.Missing as missing:
         pytest.skip(str(missing))
-    with running(tmp_path / "tls", ca, users=USERS, tls=Tls(cert=cert, key=key)) as made, made.browser() as person:
+    beside = [Path(os.path.relpath(file, tmp_path / "tls" / "config")) for file in (cert, key)]
+    tls = Tls(cert=beside[0], key=beside[1])  # paths start from the configuration's folder
+    with running(tmp_path / "tls", ca, users=USERS, tls=tls) as made, made.browser() as person:
         assert made.url.startswith("https://")
         answer = person.login("ann")
         assert answer.headers["set-cookie"].startswith("__Host-apartment=")
@@ -375,6 +379,26 @@ def test_over_tls_the_cookie_goes_over_tls_alone(tmp_path: Path) -> None:
         path = "/api/items/Kitchen_Light/command"
         assert person.post(path, {"value": "ON"}, Origin=made.url).status_code == 202
         assert person.post(path, {"value": "ON"}, Origin=made.url.replace("https", "http")).status_code == 403
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_server_that_cannot_start_is_no_dashboard_and_lets_its_port_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def fails(_server: uvicorn.Server, sockets: list[socket.socket]) -> None:
+        ports.append(sockets[0].getsockname()[1])
+        raise ValueError("something of the library")
+
+    ports: list[int] = []
+    monkeypatch.setattr(uvicorn.Server, "startup", fails)
+    with (
+        pytest.raises(OSError, match="does not answer") as caught,
+        dashboard.start(configured(tmp_path, peers.free_port()), lambda _: None),
+    ):
+        pass
+    assert isinstance(caught.value.__cause__, ValueError)
+    with socket.create_server(("127.0.0.1", ports[0])):
+        pass
 
 
 def test_who_does_not_read_keeps_nobody_waiting(guarded: Running) -> None:
