@@ -15,37 +15,21 @@ from dataclasses import dataclass, field, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, Field, SecretStr, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from services import document, secret_store
 from services.apartment.home import Home
+from services.bus_settings import BusSettings as BusSettings
 from services.document import Document, Fault, Path_
-from services.errors import ConfigError, SettingError
+from services.errors import ConfigError
 from services.registry import REGISTRY, Row
 from services.section import Section
 from services.topic import LEVELS
 
 M = TypeVar("M", bound=BaseModel)
 TOP = ("bus", "state", "home", "default_camera", "grouped")
+HELD = ("expected ${", "expected a readable file")  # of whose machine alone has it: a secret, a certificate
 INJECTED = ("name", "home", "cameras", "camera_sections", "folder", "state")  # see `section.py`
-
-
-class Tls(Section):
-    """Certificates: `ca` checks the broker; `cert` and `key` show who we are, where the broker asks for it."""
-
-    ca: Path
-    cert: Path | None = None
-    key: Path | None = None
-
-
-class BusSettings(Section):
-    """Where the broker is, and the account of each service there (none: anonymous)."""
-
-    host: str = "127.0.0.1"
-    port: int = Field(default=1883, ge=1, le=65535)
-    tls: Tls | None = None
-    accounts: dict[str, SecretStr] = {}
-    keepalive_s: int = Field(default=15, ge=5, le=600)
 
 
 @dataclass(frozen=True)
@@ -58,17 +42,15 @@ class Instance:
 
 
 def check_files(instances: dict[str, Instance], source: Document) -> list[str]:
-    """The faults of the files that the services' own settings name; `source` gets those of settings themselves."""
+    """The faults of the files that the services' own settings name."""
     faults: list[str] = []
     for instance in instances.values():
         check = getattr(importlib.import_module(instance.row.module), "check", None)
         try:
             if check is not None:
                 check(instance.config)
-        except SettingError as error:
-            source.fault(error.path, error.text)
         except ConfigError as error:
-            faults += error.faults
+            faults += source.placed(error.faults)
     return faults
 
 
@@ -120,15 +102,16 @@ def load(
     _unknown_sections(raw, source)
     _misnamed_cameras(raw, source)
     instances = {one.name: one for one in _instances(raw, source, cameras, given)}
-    others = check_files(instances, source) if deep else []
-    faults = [*_wanted(source.faults, only), *home_faults, *others]
+    bus = (top.bus if top else BusSettings()).named_in(file)
+    others = [*bus.faults(), *check_files(instances, source)] if deep else []
+    faults = [*_wanted([*source.faults, *others], only), *home_faults]
     if faults or top is None or home is None:
         raise ConfigError(sorted(dict.fromkeys(faults), key=document.by_place))
-    return Apartment(file, top.bus, home, state, cameras, top.grouped, instances)
+    return Apartment(file, bus, home, state, cameras, top.grouped, instances)
 
 
 def _wanted(faults: list[str], only: tuple[str, ...] | None) -> list[str]:
-    """Without the missing secrets of services that are not to run here (each machine holds only its own)."""
+    """Without the secrets and certificates of services that do not run here (each machine holds only its own)."""
     if only is None:
         return faults
     mine = ("bus.accounts.", *(f"{row.section[0]}." for row in REGISTRY))
@@ -137,7 +120,7 @@ def _wanted(faults: list[str], only: tuple[str, ...] | None) -> list[str]:
     def matters(fault: str) -> bool:
         where = fault.key if isinstance(fault, Fault) else ""
         foreign = where.startswith(mine) and not any(where.startswith(prefix) for prefix in kept)
-        return not ("expected ${" in fault and foreign)
+        return not (foreign and any(f": {wanted}" in fault for wanted in HELD))
 
     return [fault for fault in faults if matters(fault)]
 

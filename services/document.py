@@ -7,14 +7,14 @@ as booleans) stay texts, since `ON` is a state of a light here.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from services.errors import ConfigError
+from services.errors import ConfigError, Setting
 from services.whole_file import write_whole
 
 Path_ = tuple[str | int, ...]
@@ -83,6 +83,13 @@ class Document:
     def fault(self, path: Path_, text: str) -> None:
         """Notes a fault."""
         self.faults.append(Fault(self.file, self.line(path), dotted(path) or "file", text))
+
+    def placed(self, faults: Iterable[str]) -> list[str]:
+        """The faults, those of settings with the lines that these have here."""
+        return [
+            Fault(self.file, self.line(one.path), dotted(one.path), one.text) if isinstance(one, Setting) else one
+            for one in faults
+        ]
 
 
 def dotted(path: Path_) -> str:

@@ -38,12 +38,20 @@ class ConfigError(ApartmentError):
         super().__init__("\n".join(self.faults))
 
 
-class SettingError(ConfigError):
-    """Settings of a service that do not go together: `path` is the keys of one of them, from the file's top.
+class Setting(str):
+    """A fault of a setting: `path` is its keys from the file's top. In which line it stands, `document.py` knows."""
 
-    Where it stands is for who read the file (`config.py`).
-    """
+    path: tuple[str, ...]
+    text: str
+
+    def __new__(cls, path: tuple[str, ...], text: str) -> Setting:
+        self = super().__new__(cls, f"{'.'.join(path)}: {text}")
+        self.path, self.text = path, text
+        return self
+
+
+class SettingError(ConfigError):
+    """One setting of a service that does not do."""
 
     def __init__(self, path: tuple[str, ...], text: str) -> None:
-        self.path, self.text = path, text
-        super().__init__([f"{'.'.join(path)}: {text}"])
+        super().__init__([Setting(path, text)])

@@ -13,7 +13,6 @@ import logging
 import os
 import secrets
 import signal
-import ssl
 import sys
 import threading
 import time
@@ -24,11 +23,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from services import document
 from services.aside import Aside
 from services.bus import WAKE_TOPIC, Message
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
-from services.config import Apartment, BusSettings, Instance, Tls
+from services.config import Apartment, BusSettings, Instance
 from services.errors import ConfigError
 from services.memory import few_arenas
 from services.runner import Runner
@@ -56,7 +56,10 @@ LOG_FORMAT = "%(asctime)s.%(msecs)03d %(levelname)-7s %(name)s: %(message)s"
 
 
 def address(settings: BusSettings, client_id: str, account: str, **options: Any) -> Address:
-    """Where the broker is, for a client that uses this account (anonymous without a password for it)."""
+    """Where the broker is, for a client that uses this account (anonymous without a password for it).
+
+    ConfigError when a certificate cannot be used.
+    """
     password = settings.accounts.get(account) or None  # an empty one is none
     return Address(
         client_id=client_id,
@@ -64,7 +67,7 @@ def address(settings: BusSettings, client_id: str, account: str, **options: Any)
         port=settings.port,
         user=account if password is not None else None,
         password=password.get_secret_value() if password is not None else None,
-        tls=tls_context(settings.tls) if settings.tls else None,
+        tls=settings.tls.context() if settings.tls else None,
         keepalive_s=settings.keepalive_s,
         **options,
     )
@@ -81,14 +84,6 @@ def client_id(settings: BusSettings, name: str, state: Path) -> str:
         file.parent.mkdir(parents=True, exist_ok=True)
         write_private(file, f"{name}-{secrets.token_hex(8)}")
     return file.read_text(encoding="ascii")
-
-
-def tls_context(tls: Tls) -> ssl.SSLContext:
-    """Checks the broker by our CA, host name included, TLS 1.2 or newer."""
-    context = ssl.create_default_context(cafile=str(tls.ca))
-    if tls.cert is not None:
-        context.load_cert_chain(tls.cert, tls.key)
-    return context
 
 
 def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
@@ -124,6 +119,8 @@ def _one(apartment: Apartment, instance: Instance, stopping: threading.Event, re
             _on_bus(apartment, instance, stopping, ready)
         else:
             _off_bus(instance, stopping, ready)
+    except ConfigError as error:
+        raise ConfigError(document.read(apartment.file).placed(error.faults)) from error
     except OSError as error:
         if not isinstance(error.filename, str) or not _belongs(Path(error.filename), apartment.state):
             raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -9,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from services import secret_store
+from services import peers, secret_store
+from services.client import connected
 from services.config import load
 from services.document import dotted, read, write
 from services.errors import ConfigError
+from tests.bus.test_tls import certificates
 
 CONFIG = Path(__file__).parents[1] / "config"
 
@@ -187,6 +190,90 @@ def test_a_password_never_stands_in_a_fault(folder: Path) -> None:
     file = folder / "simulated.yaml"
     spoil(file, "  password: ${CAMERA_IP1_PASSWORD:-only-simulated}", "  password: [very-secret]", first=True)
     assert "very-secret" not in "\n".join(faults(file))
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A certificate and its key."""
+    try:
+        _, cert, key = certificates(tmp_path_factory.mktemp("certificates") / "ours", "our CA")
+    except peers.Missing as missing:
+        pytest.skip(str(missing))
+    return cert, key
+
+
+BUS = "bus:\n  host", "bus:\n  tls: {ca: ca.crt}\n  host"
+PAGE = "  plan: plan.yaml\n", "  tls:\n    cert: page.crt\n    key: page.key\n  plan: plan.yaml\n"
+
+
+def test_certificates_are_looked_for_beside_the_configuration(folder: Path, pair: tuple[Path, Path]) -> None:
+    file = folder / "simulated.yaml"
+    spoil(file, *BUS)
+    spoil(file, *PAGE)
+    for name, source in (("ca.crt", pair[0]), ("page.crt", pair[0]), ("page.key", pair[1])):
+        shutil.copy(source, folder / name)
+    tls = load(file, deep=True).bus.tls
+    assert tls is not None
+    assert (tls.ca, tls.cert) == (folder / "ca.crt", None)
+
+
+def test_every_certificate_that_cannot_be_used_is_told_with_its_line(folder: Path, pair: tuple[Path, Path]) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, *BUS) + 1
+    assert faults(file) == [f"{file}:{line}: bus.tls.ca: expected a readable file, got no file {folder / 'ca.crt'}"]
+    (folder / "ca.crt").write_text("no certificate")
+    at = spoil(file, *PAGE) + 1
+    (folder / "page.key").mkdir()
+    assert faults(file) == [
+        f"{file}:{line}: bus.tls.ca: expected certificates as PEM, got none in {folder / 'ca.crt'}",
+        f"{file}:{at}: dashboard.tls.cert: expected a readable file, got no file {folder / 'page.crt'}",
+        f"{file}:{at + 1}: dashboard.tls.key: expected a readable file, got Is a directory: {folder / 'page.key'}",
+    ]
+    shutil.copy(pair[0], folder / "ca.crt")
+    shutil.copy(pair[0], folder / "page.crt")
+    (folder / "page.key").rmdir()
+    shutil.copy(pair[0], folder / "page.key")
+    (told,) = faults(file)
+    assert told.startswith(f"{file}:{at}: dashboard.tls.cert: expected a certificate as PEM and its own key")
+
+
+def test_a_key_that_a_password_locks_is_told_and_no_password_asked_for(folder: Path, pair: tuple[Path, Path]) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, *PAGE) + 1
+    shutil.copy(pair[0], folder / "page.crt")
+    locked = ("pkey", "-in", pair[1], "-aes128", "-passout", "pass:secret", "-out", folder / "page.key")
+    subprocess.run([peers.program("openssl", "openssl"), *locked], check=True, capture_output=True, timeout=60)
+    (told,) = faults(file)
+    assert told.startswith(f"{file}:{line}: dashboard.tls.cert: expected a certificate as PEM and its own key")
+
+
+def test_a_machine_without_the_dashboard_needs_no_certificate_of_its_page(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    spoil(file, *PAGE)
+    load(file, ("bridge",), deep=True)
+    with pytest.raises(ConfigError, match=r"dashboard\.tls\.key"):
+        load(file, ("dashboard",), deep=True)
+
+
+def test_who_comes_to_the_broker_without_a_check_before_is_told_too(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, *BUS) + 1
+    settings = load(file).bus  # what is installed first may come later: nothing here needs the broker
+    with pytest.raises(ConfigError) as caught, connected(settings):
+        pass
+    assert caught.value.faults[0].startswith(f"{file}:{line}: bus.tls.ca: expected a readable file, got no file")
+
+
+def test_a_service_that_is_started_without_a_check_before_ends_with_two(folder: Path) -> None:
+    file = folder / "simulated.yaml"
+    line = spoil(file, *PAGE) + 1
+    command = [sys.executable, "-m", "services", "serve", "dashboard", "--config", str(file)]
+    environment = {**os.environ, "APARTMENT_DASHBOARD_PORT": "0", "XDG_STATE_HOME": str(folder)}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment)
+    assert done.returncode == 2
+    assert f"{file}:{line}: dashboard.tls.cert: expected a readable file, got no file" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "READY" not in done.stdout
 
 
 def test_only_the_services_that_run_here_need_their_secrets(monkeypatch: pytest.MonkeyPatch) -> None:

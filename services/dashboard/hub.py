@@ -12,10 +12,12 @@ from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 from services.bus import topic_matches
+from services.dashboard.latest import MOST_TOPICS, Latest
 from services.dashboard.view import Entry
 
 QUEUE = 20  # batches that wait for one page: two seconds
-MOST_TOPICS = 20_000  # the oldest go
+QUEUE_TEXT = 2_000_000  # characters of them
+PAST_TEXT = 1_000_000  # characters of each of PAST
 MOST_PAGES = 100
 PAST = {  # what a page is told of what was, when it opens: so many of each
     "camera/+/order_result": 40, "camera/+/scan/result": 40, "camera/+/audio": 20, "home/+/command": 40,
@@ -59,7 +61,7 @@ class Page:
 
     def put(self, text: str) -> None:
         """Adds a batch; when too many wait, they are given up."""
-        if len(self.queue) >= QUEUE:
+        if len(self.queue) >= QUEUE or sum(map(len, self.queue)) > QUEUE_TEXT:
             self.queue.clear()
             self.behind = True
         if not self.behind:
@@ -71,7 +73,7 @@ class Hub:
     """All calls come from the event loop."""
 
     def __init__(self) -> None:
-        self.latest: dict[str, Entry] = {}
+        self.latest = Latest()
         self._past = {one: deque[Entry](maxlen=most) for one, most in PAST.items()}
         self.closed = False
         self._groups: dict[Filters, Group] = {}
@@ -141,6 +143,6 @@ class Hub:
         for one, kept in self._past.items():
             if one.startswith(first) and topic_matches(one, entry.topic):
                 kept.append(entry)
-        if entry.topic not in self.latest and len(self.latest) >= MOST_TOPICS:
-            self.latest.pop(next(iter(self.latest)))
+                while sum(len(past.text) for past in kept) > PAST_TEXT:
+                    kept.popleft()
         self.latest[entry.topic] = entry

@@ -71,7 +71,7 @@ class Maps:
 def check(config: Config) -> None:
     """ConfigError with every fault of the files that the settings name."""
     faults: list[str] = []
-    for read in (lambda: _plan(config), lambda: _maps(config), lambda: [*_cameras(config)]):
+    for read in (lambda: _plan(config), lambda: _maps(config), lambda: [*_cameras(config)], config.certificate):
         try:
             read()
         except ConfigError as error:

@@ -11,6 +11,7 @@ from services.apartment.cameras import CameraSections
 from services.apartment.home import Home
 from services.dashboard import passwords
 from services.section import Section
+from services.tls import server_context
 
 Role = Literal["viewer", "operator"]
 
@@ -59,3 +60,11 @@ class Config(Section):
     camera_sections: CameraSections = {}
     folder: Path = Path()
     state: Path | None = None
+
+    def certificate(self) -> tuple[Path, Path] | None:
+        """The files of the page's certificate and its key, if it has one; ConfigError when they cannot be used."""
+        if self.tls is None:
+            return None
+        cert, key = self.folder / self.tls.cert, self.folder / self.tls.key
+        server_context(("dashboard", "tls"), cert, key)
+        return cert, key

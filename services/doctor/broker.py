@@ -57,8 +57,6 @@ def _unreachable(where: str, error: OSError) -> Finding:
             "bus.tls.ca: the ca.crt of the broker's machine; bus.host: a name in its certificate (secrets init --host)"
         )
         return ill(PART, f"{where} shows a certificate that is not trusted: {error.reason or error}", mend)
-    if isinstance(error, FileNotFoundError):
-        return ill(PART, f"no file {error.filename}", "bus.tls.ca: copy ca.crt from the broker's machine")
     if isinstance(error, socket.gaierror):
         return ill(PART, f"nobody knows the name in {where}", "bus.host: the broker's address, or a line in /etc/hosts")
     mend = "systemctl start mosquitto; or bus.host and bus.port; from another machine by TLS at 8883 alone"

@@ -12,6 +12,7 @@ from services import secret_store
 from services.config import Apartment
 from services.credentials import strength
 from services.doctor.findings import Finding, ill, well
+from services.document import Fault
 
 LEAST_FREE = 500 * 1024 * 1024  # bytes: some days of states and pictures
 PART = "machine"
@@ -24,6 +25,8 @@ def faults(told: tuple[str, ...]) -> Iterator[Finding]:
         if missing:
             mend = "apartment secrets init" if missing.startswith(("BUS_", "DATABASE_")) else "apartment secrets set"
             yield ill("secrets", fault, f"{mend}{'' if mend.endswith('init') else f' {missing}'}")
+        elif isinstance(fault, Fault) and fault.key == "bus.tls.ca":
+            yield ill("broker", fault, "bus.tls.ca: copy ca.crt from the broker's machine")
         else:
             yield ill("configuration", fault, "change that line")
 

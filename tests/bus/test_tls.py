@@ -11,9 +11,8 @@ import pytest
 
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
-from services.config import Tls
+from services.bus_settings import Tls
 from services.peers import free_port, mosquitto, program, wait_until
-from services.process import tls_context
 
 pytestmark = pytest.mark.mosquitto
 
@@ -65,9 +64,9 @@ def broker(folder: Path) -> Iterator[tuple[int, Path]]:
 def test_a_broker_of_our_ca_is_met_and_one_of_anothers_is_not(tmp_path: Path) -> None:
     other, _, _ = certificates(tmp_path / "theirs", "their CA")
     with broker(tmp_path) as (port, ca):
-        good = MqttBus(Address("good", port=port, tls=tls_context(Tls(ca=ca))))
+        good = MqttBus(Address("good", port=port, tls=Tls(ca=ca).context()))
         wait_until(lambda: good.receive(0.02) or good.connected, "a connection over TLS", 5.0)
-        bad = MqttBus(Address("bad", port=port, tls=tls_context(Tls(ca=other))))
+        bad = MqttBus(Address("bad", port=port, tls=Tls(ca=other).context()))
         with pytest.raises(TimeoutError):
             wait_until(lambda: bad.receive(0.02) or bad.connected, "a connection to a stranger", 1.0)
         good.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 import time
 from collections.abc import Iterator
@@ -12,9 +13,10 @@ from pathlib import Path
 
 import httpx
 import pytest
+import uvicorn
 from openapi_spec_validator import validate
 
-from services import peers, topics
+from services import dashboard, peers, topics
 from services.config import BusSettings
 from services.dashboard.sessions import FREE_TRIES
 from services.dashboard.settings import Tls
@@ -242,6 +244,22 @@ def test_an_order_that_is_wrong_is_told_why(guarded: Running, path: str, body: o
     assert why in answer.json()["error"]
 
 
+@pytest.mark.parametrize(
+    ("path", "text", "why"),
+    [
+        ("/api/cameras/ip1/position", '{"pan": 1e305}', "pan: "),
+        ("/api/cameras/ip1/orders/Zoom", '{"value": 1e400}', "value: "),
+        ("/api/cameras/ip1/orders/Scan", '{"value": {"targets": [-1e400]}}', "value: "),
+    ],
+)
+def test_a_number_that_nobody_can_take_is_told(guarded: Running, path: str, text: str, why: str) -> None:
+    with guarded.browser("ann") as person:
+        headers = {"X-CSRF-Token": person.csrf, "Content-Type": "application/json"}
+        answer = person.http.post(path, content=text, headers=headers)
+    assert answer.status_code == 422
+    assert answer.json()["error"].startswith(why)
+
+
 def test_a_body_that_nobody_needs_is_refused(guarded: Running) -> None:
     with guarded.browser("ann") as person:
         assert person.post("/api/publish", {"topic": "x", "payload": "x" * 70_000}).status_code == 413
@@ -256,6 +274,19 @@ def test_states_and_places_can_be_asked_for(guarded: Running) -> None:
         found = person.get("/api/states", params={"topics": "home/+/state"}).json()
         assert found["home/Kitchen_Temp/state"] == "21.5 °C"
         assert person.get("/api/states", params={"topics": "home/<x>"}).status_code == 422
+
+
+def test_a_state_that_somebody_takes_away_is_gone(guarded: Running) -> None:
+    topic = "camera/ip1/scan/state"
+    guarded.bus.say(topic, '{"state": "idle"}', retain=True)
+    with guarded.browser("vic") as person:
+
+        def kept() -> bool:
+            return topic in person.get("/api/states", params={"topics": topic}).json()
+
+        peers.wait_until(kept, "the state")
+        guarded.bus.say(topic, "", retain=True)
+        peers.wait_until(lambda: not kept(), "the state to go")
 
 
 def test_a_page_hears_of_a_change_within_a_moment(guarded: Running) -> None:
@@ -336,7 +367,15 @@ def test_the_newest_analysed_picture_of_a_scan_can_be_fetched(guarded: Running) 
 
 
 @pytest.mark.parametrize(
-    "query", ["since=yesterday", "since=2026-02-01T00:00:00Z&until=2026-01-01T00:00:00Z", "points=0", "points=9999999"]
+    "query",
+    [
+        "since=yesterday",
+        "since=2026-02-01T00:00:00Z&until=2026-01-01T00:00:00Z",
+        "until=0001-01-01T00:00:00Z",
+        "points=0",
+        "points=9999999",
+        f"points={'9' * 5000}",
+    ],
 )
 def test_a_span_that_is_none_is_told(guarded: Running, query: str) -> None:
     with guarded.browser("vic") as person:
@@ -365,7 +404,9 @@ def test_over_tls_the_cookie_goes_over_tls_alone(tmp_path: Path) -> None:
         ca, cert, key = certificates(tmp_path / "ca", "our own CA")
     except peers.Missing as missing:
         pytest.skip(str(missing))
-    with running(tmp_path / "tls", ca, users=USERS, tls=Tls(cert=cert, key=key)) as made, made.browser() as person:
+    beside = [Path(os.path.relpath(file, tmp_path / "tls" / "config")) for file in (cert, key)]
+    tls = Tls(cert=beside[0], key=beside[1])  # paths start from the configuration's folder
+    with running(tmp_path / "tls", ca, users=USERS, tls=tls) as made, made.browser() as person:
         assert made.url.startswith("https://")
         answer = person.login("ann")
         assert answer.headers["set-cookie"].startswith("__Host-apartment=")
@@ -375,6 +416,26 @@ def test_over_tls_the_cookie_goes_over_tls_alone(tmp_path: Path) -> None:
         path = "/api/items/Kitchen_Light/command"
         assert person.post(path, {"value": "ON"}, Origin=made.url).status_code == 202
         assert person.post(path, {"value": "ON"}, Origin=made.url.replace("https", "http")).status_code == 403
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_server_that_cannot_start_is_no_dashboard_and_lets_its_port_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def fails(_server: uvicorn.Server, sockets: list[socket.socket]) -> None:
+        ports.append(sockets[0].getsockname()[1])
+        raise ValueError("something of the library")
+
+    ports: list[int] = []
+    monkeypatch.setattr(uvicorn.Server, "startup", fails)
+    with (
+        pytest.raises(OSError, match="does not answer") as caught,
+        dashboard.start(configured(tmp_path, peers.free_port()), lambda _: None),
+    ):
+        pass
+    assert isinstance(caught.value.__cause__, ValueError)
+    with socket.create_server(("127.0.0.1", ports[0])):
+        pass
 
 
 def test_who_does_not_read_keeps_nobody_waiting(guarded: Running) -> None:

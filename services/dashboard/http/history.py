@@ -19,6 +19,7 @@ from services.states import base_type
 POINTS = 800  # of a plot, when nobody says how many
 MOST_POINTS = 1500  # more do not fit into an answer of the bus
 PAST_MISSIONS = 40  # of all robots; each with its story
+EARLIEST = seconds("0001-01-01T00:00:00Z")  # there is no day before
 NUMBERS = ("Number", "Dimmer", "Rollershutter")
 WIDTHS_S = (
     1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400,
@@ -103,7 +104,7 @@ def _good(reply: HistoryReply) -> HistoryReply:
 
 def _span(asked: Asked) -> tuple[float, float]:
     until = _time(asked, "until", time.time())
-    since = _time(asked, "since", until - 86400.0)
+    since = _time(asked, "since", max(EARLIEST, until - 86400.0))
     if not 0 < until - since < 1e10:
         raise BadMessage("since: expected a time before until")
     return since, until
@@ -119,7 +120,7 @@ def _time(asked: Asked, name: str, default: float) -> float:
 
 def _points(asked: Asked) -> int:
     text = asked.query("points", str(POINTS))
-    if not text.isdecimal() or not 1 <= int(text) <= MOST_POINTS:
+    if not text.isdecimal() or not 1 <= int(text[:9]) <= MOST_POINTS:
         raise BadMessage(f"points: expected 1 to {MOST_POINTS}, got {text[:20]!r}")
     return int(text)
 
