@@ -16,9 +16,8 @@ from rich.table import Table
 from rich.text import Text
 
 from services.command_line import hearing
-from services.command_line.options import CONFIG, Config, Json, out
+from services.command_line.options import CONFIG, Config, Json, out, printable
 from services.command_line.standing import COUNTED, FILTERS, Camera, Robot, Service, Standing
-from services.command_line.watch import printable
 from services.config import load
 from services.errors import ConfigError
 
