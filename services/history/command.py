@@ -64,9 +64,24 @@ def every_s(text: str) -> float | None:
 def ask(address: Address, asked: HistoryGet) -> HistoryReply:
     """The answer; BadMessage when there is none."""
     with closing(open_ready(address)) as storage:
-        reply = answers.answer(storage, asked, time.time())
+        reply = _answer(storage, asked)
     if reply.error:
         raise BadMessage(reply.error)
+    return reply
+
+
+def _answer(storage: Storage, asked: HistoryGet) -> HistoryReply:
+    """Changes come in pieces, as one answer looks at so many samples only; the newest piece first."""
+    reply, most = answers.answer(storage, asked, time.time()), asked.limit or answers.USUAL
+    while reply.changes is not None and reply.since is not None and len(reply.changes) < most:
+        later = [row for row in reply.changes if row[1] >= reply.since]
+        further = asked.model_copy(update={"until": reply.since, "limit": most - len(later)})
+        before = answers.answer(storage, further, time.time())
+        if before.since == reply.since:  # more within a millisecond than it looks at
+            break
+        both = [*(before.changes or ()), *later]
+        found = {"samples": [row[1:] for row in both], "changes": both, "since": before.since}
+        reply = reply.model_copy(update=found)
     return reply
 
 

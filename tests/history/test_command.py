@@ -103,6 +103,15 @@ def test_changes_of_all_items(site: Path) -> None:
     assert "Light" in run(site, "--what", "changes", "--since", "3h", "--limit", "200", "--csv").replace(",", " ")
 
 
+def test_changes_are_found_behind_many_samples_that_are_none(site: Path) -> None:
+    storage = open_storage("sqlite:///bus.db", site.parent)
+    now = round(time.time() * 1e6)
+    storage.write(Batch([Sample("Light", now - HOUR_US + n * 100_000, 0.0, "OFF") for n in range(1, 25_001)]))
+    storage.close()
+    lines = run(site, "Light", "--what", "changes", "--since", "3h", "--limit", "3", "--csv").splitlines()
+    assert [line.rpartition(",")[2] for line in lines] == ["state", "ON", "OFF"]
+
+
 def test_nothing_found_ends_with_one(site: Path) -> None:
     assert run(site, "Lab", "--until", "2020-01-01", code=1).strip() == ""
 
