@@ -111,6 +111,13 @@ def test_long_texts_are_asked_for_in_pieces_that_fit(stored: Running) -> None:
     assert [told.split()[0] for _, told in series["rows"]] == [str(number) for number in range(TEXTS)]
 
 
+def test_a_table_has_every_digit_of_a_number(stored: Running) -> None:
+    with stored.browser() as person:
+        lines = person.get(f"/api/history/Kitchen_Temp.csv?{SPAN}").text.splitlines()
+    cells = [line.split(",")[1:] for line in lines[1:]]
+    assert cells == [["12345.678"] * 3, ["0.30000000000000004"] * 3, ["9007199254740991"] * 3]
+
+
 def endless(asked: Message) -> Iterator[Message]:
     """More than anybody would wait for: each answer goes back a minute."""
     question = topics.read(asked, time.time()).payload

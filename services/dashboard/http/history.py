@@ -165,7 +165,7 @@ def _csv(series: Series) -> str:
 def _cell(value: object) -> str:
     """Quoted as RFC 4180 wants; a text that a spreadsheet would take for a formula is shown as text."""
     if isinstance(value, float | int):
-        return f"{value:g}"
+        return repr(float(value)).removesuffix(".0")  # every digit
     text = str(value)
     if text[:1] in "=+-@\t\r":
         text = f"'{text}"
