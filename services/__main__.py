@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from services import access, process, secret_store
 from services.command_line import (
@@ -37,9 +36,9 @@ from services.command_line import (
     stored,
     watch,
 )
-from services.command_line.options import CONFIG, SERVICES, Config, Json, Unread, out
+from services.command_line.options import CONFIG, SERVICES, Config, Json, Screen, Unread, out
 from services.config import Apartment, load
-from services.errors import ApartmentError, ConfigError
+from services.errors import ApartmentError, ConfigError, words
 from services.supervisor import Supervisor, commands, processes, simulated
 from services.topics import asyncapi, page
 
@@ -47,7 +46,7 @@ app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
     help="A smart apartment, its ceiling camera and a ROS 1 robot on one MQTT event bus.",
 )  # fmt: skip
-err = Console(stderr=True, soft_wrap=True, highlight=False)
+err = Screen(stderr=True)
 
 
 @app.command(epilog="Example: apartment run --config config/simulated.yaml")
@@ -202,10 +201,13 @@ def main() -> None:
         app(standalone_mode=True)
     except ConfigError as error:
         for fault in error.faults:
-            err.print(fault, style="red", markup=False)
+            err.print(fault, style="red")
         sys.exit(2)
     except (ApartmentError, TimeoutError) as error:
-        err.print(str(error), style="red", markup=False)
+        err.print(str(error), style="red")
+        sys.exit(1)
+    except OSError as error:  # of a service that ran, its log has the story
+        err.print(words(error), style="red")
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(130)

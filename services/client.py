@@ -16,6 +16,7 @@ from typing import Any
 from services.bus import Bus, Message, topic_matches
 from services.bus.mqtt import MqttBus
 from services.config import BusSettings
+from services.errors import Unavailable
 from services.payloads import Order, OrderResult
 from services.process import address
 from services.topics import CAMERA_ORDER, CAMERA_ORDER_RESULT, SERVICE_STATUS, read
@@ -164,13 +165,16 @@ class _Given:
 def connected(
     settings: BusSettings, filters: Sequence[str] = (), account: str = "operator", timeout_s: float = 5.0
 ) -> Iterator[Client]:
-    """A client of the configured broker; TimeoutError when it does not answer."""
+    """A client of the configured broker; TimeoutError when it does not answer, Unavailable when it lets us not in."""
     bus = MqttBus(address(settings, f"{account}-{os.getpid()}-{uuid.uuid4().hex[:6]}", account))
     try:
         bus.subscribe(filters)
         end = time.monotonic() + timeout_s
         waiting: list[Message] = []
         while not bus.listens:
+            if bus.refused:
+                who = f"bus.accounts.{account}" if settings.accounts.get(account) else "somebody without a name"
+                raise Unavailable(f"the broker at {settings.host}:{settings.port} refuses {who}: {bus.refused}")
             if time.monotonic() > end:
                 raise TimeoutError(f"no broker answers at {settings.host}:{settings.port}")
             waiting += bus.receive(0.05)

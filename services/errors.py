@@ -14,6 +14,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 
+def words(error: OSError) -> str:
+    """What the system refused, as people read it: the file, where there is one, and why."""
+    why = error.strerror or str(error)
+    return why if error.filename is None else f"{error.filename}: {why}"
+
+
 class ApartmentError(Exception):
     """The base of every error that this package raises on purpose."""
 

@@ -44,7 +44,11 @@ class Doors(ThreadingHTTPServer):
 
     def server_bind(self) -> None:
         """Binds; asks no name server for its own name."""
-        TCPServer.server_bind(self)
+        host, port = str(self.server_address[0]), self.server_address[1]
+        try:
+            TCPServer.server_bind(self)
+        except OSError as error:
+            raise OSError(error.errno, f"cannot listen on {host}:{port}: {error.strerror}") from error
         self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
 
     def verify_request(self, request: Any, client_address: Any) -> bool:

@@ -19,7 +19,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from services.bus import WAKE_TOPIC, Message
 from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.config import Apartment, BusSettings, Instance
-from services.errors import ConfigError
+from services.errors import ConfigError, Unavailable, words
 from services.memory import few_arenas
 from services.runner import Runner
 from services.steering import Steered
@@ -123,8 +123,9 @@ def _one(apartment: Apartment, instance: Instance, stopping: threading.Event, re
         raise ConfigError(document.read(apartment.file).placed(error.faults)) from error
     except OSError as error:
         if not isinstance(error.filename, str) or not _belongs(Path(error.filename), apartment.state):
+            log.exception("%s ends by a fault of its own", instance.name)
             raise
-        why = f"{error.filename}: {error.strerror}"
+        why = words(error)
         raise ConfigError([f"{apartment.file}:1: state: expected a folder that can be written, got {why}"]) from error
 
 
@@ -134,9 +135,23 @@ def _belongs(file: Path, folder: Path) -> bool:
     return file.is_relative_to(folder) or folder.is_relative_to(file)
 
 
+@contextmanager
+def _started(instance: Instance, *given: Any) -> Iterator[Any]:
+    """What runs; Unavailable when this machine does not give it what it needs, a port that is free mostly."""
+    with ExitStack() as stack:
+        try:
+            started = importlib.import_module(instance.row.module).start(instance.config, *given)
+            running = stack.enter_context(started)
+        except OSError as error:
+            if error.filename is not None:
+                raise
+            raise Unavailable(f"{instance.name}: {words(error)}") from error
+        yield running
+
+
 def _off_bus(instance: Instance, stopping: threading.Event, ready: OneReady) -> None:
     """A program of its own, such as the simulated camera: it answers by itself."""
-    with importlib.import_module(instance.row.module).start(instance.config) as program:
+    with _started(instance) as program:
         ready(instance.name, dict(program.addresses))
         stopping.wait()
 
@@ -157,7 +172,7 @@ def _on_bus(apartment: Apartment, instance: Instance, stopping: threading.Event,
     )
     threading.Thread(target=_wake, args=(bus, stopping), daemon=True, name="stop").start()
     try:
-        with importlib.import_module(row.module).start(instance.config, bus.post) as service:
+        with _started(instance, bus.post) as service:
             runner = Runner(
                 name, Steered(name, service, stopping.set), bus, time.time, Aside(apartment.state / name / "aside")
             )

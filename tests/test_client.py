@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,8 +15,9 @@ from services.bus.memory import WINDOW, Hub, MemoryBus
 from services.bus.mqtt import MqttBus
 from services.client import ANSWER_S, Client, connected
 from services.config import BusSettings
+from services.errors import Unavailable
 from services.payloads import Motion, OrderResult, OrderState
-from services.peers import mosquitto, wait_until
+from services.peers import free_port, mosquitto, wait_until
 from services.topics import CAMERA_ORDER_RESULT
 
 STATE = Message("home/Kitchen_Light/state", b"ON", retain=True)
@@ -45,6 +47,27 @@ def test_what_comes_before_it_is_known_to_be_connected_is_given_by_the_first_pum
     with connected(settings, ["home/#"]) as late:
         assert [message.topic for message in _pumped(late)] == [STATE.topic]
         assert [message.topic for message in late.seen] == [STATE.topic]
+
+
+@pytest.mark.mosquitto
+@pytest.mark.parametrize(
+    ("accounts", "who"), [({"operator": "wrong"}, "bus.accounts.operator"), ({}, "somebody without a name")]
+)
+def test_who_is_not_let_in_is_told_that_and_not_that_nobody_answers(
+    tmp_path: Path, accounts: dict[str, str], who: str
+) -> None:
+    with mosquitto.private(tmp_path) as broker:
+        settings = BusSettings.model_validate({"port": broker.port, "accounts": accounts})
+        with pytest.raises(Unavailable) as told, connected(settings, timeout_s=30.0):
+            pass
+    assert str(told.value) == f"the broker at 127.0.0.1:{broker.port} refuses {who}: Not authorized"
+
+
+def test_nobody_there_is_told_as_before() -> None:
+    port = free_port()
+    told = pytest.raises(TimeoutError, match=f"no broker answers at 127.0.0.1:{port}")
+    with told, connected(BusSettings(port=port), timeout_s=0.2):
+        pass
 
 
 def _pumped(client: Client) -> list[Message]:

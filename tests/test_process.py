@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Event
+from types import SimpleNamespace
 
 import pytest
 
-from services import peers
+from services import peers, process
+from services.apartment.home import Home
+from services.config import Apartment, BusSettings, Instance
 from services.process import Clock
+from services.registry import Row
+from services.section import Section
 from services.supervisor import Supervisor, in_background
 
 HOLDS_THE_PIPE = """
@@ -85,6 +94,25 @@ def test_a_state_folder_that_cannot_be_written_is_told_in_a_line(tmp_path: Path)
         f"{config}:1: state: expected a folder that can be written, "
         f"got {tmp_path}/home.yaml/state/persistence: Not a directory"
     ]
+
+
+@contextmanager
+def start(config: Section) -> Iterator[SimpleNamespace]:
+    """A program that loses a connection while it runs."""
+    yield SimpleNamespace(addresses={})
+    raise ConnectionResetError(errno.ECONNRESET, "Connection reset by peer")
+
+
+def test_the_story_of_an_error_in_a_service_that_runs_is_in_its_log(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    instance = Instance("odd", Row("odd", __name__, (), "it loses a connection", on_bus=False), Section())
+    where = Apartment(Path("-"), BusSettings(), Home(items={}), tmp_path, (), instances={"odd": instance})
+    stopping = Event()
+    stopping.set()
+    with pytest.raises(ConnectionResetError):
+        process._one(where, instance, stopping, lambda name, addresses: None)
+    assert "odd ends by a fault of its own\nTraceback" in caplog.text
 
 
 def test_what_others_need_ends_after_them(tmp_path: Path) -> None:

@@ -47,6 +47,7 @@ class MqttBus:
     ) -> None:
         self.address = address
         self.connections = 0
+        self.refused = ""  # why the broker let us not in, when it was last asked
         self._protocol = address.protocol
         self._negotiated = address.protocol == 4
         self._will = will
@@ -262,6 +263,7 @@ class MqttBus:
 
     def _on_connect(self, client: Client, _data: Any, flags: Any, reason: ReasonCode, _properties: Any) -> None:
         if reason.is_failure:
+            self.refused = str(reason)
             self._tell(f"the broker refuses {self.address.client_id}: {reason}")
             self._lost.set()
             return

@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from services.command_line.options import CONFIG, Json, Unread, out
+from services.command_line.options import CONFIG, Json, Unread, out, writable
 from services.errors import Unavailable
 
 SOURCES = Path(__file__).parents[2]
@@ -36,6 +36,7 @@ def bench(
         raise Unavailable("the benchmarks come with the project's sources: run it there, or `make bench`")
     if any(find_spec(one) is None for one in NEEDED):
         raise Unavailable("the benchmarks need the tests' packages: `make bench` installs them, then runs it")
+    writable(kept, "--out")
     file = kept.resolve()
     arguments = ["--part", part, "--runs", str(runs), "--json", str(file)]
     screen = subprocess.DEVNULL if json else None

@@ -21,7 +21,7 @@ from services import client, document
 from services.client import Client
 from services.command_line import prints
 from services.command_line.calibrate_map import map_
-from services.command_line.options import CONFIG, Camera, Config, YesMove, out
+from services.command_line.options import CONFIG, Camera, Config, YesMove, out, printable, writable
 from services.command_line.order import tell, with_camera
 from services.command_line.prints import Book, Inner, Kind, Side, Squares, squares_of
 from services.command_line.zoom import zoom
@@ -70,6 +70,8 @@ def lens(
     config: Config = CONFIG,
 ) -> None:
     """Learn the lens from a board that you show to the camera; tells what to show next. Writes ost.yaml."""
+    report = report or Path(f"{camera}-lens.html")
+    writable(report, "--out")
     apartment, (columns, rows) = _apartment(config, camera), squares_of(squares)
     wish: dict[str, Any] = {
         "board": board, "columns": columns, "rows": rows, "square_mm": square, "dictionary": dictionary,
@@ -78,7 +80,7 @@ def lens(
     told = _learnt(apartment, camera, "CalibrateLens", wish)
     _show(told)
     out.print(f"written to {told.file}; the camera's service uses it from now on")
-    _copy(told.report, report or Path(f"{camera}-lens.html"))
+    _copy(told.report, report)
 
 
 @app.command(epilog="Example: apartment calibrate mount ip1 --at 582=3.90,4.52,0.46 --at 17=1.80,4.14,0.92")
@@ -95,6 +97,8 @@ def mount(
 
     Markers that the configuration knows (markers.known) are used besides those given here.
     """
+    report = report or Path(f"{camera}-mount.html")
+    writable(report, "--out")
     apartment = _apartment(config, camera)
     markers = dict(map(_placed, at or []))
     if not _may_move(ASK.format(camera), yes_move=yes_move):
@@ -103,7 +107,7 @@ def mount(
     _show(told)
     if told.said:
         out.print(told.said, style="yellow")
-    _copy(told.report, report or Path(f"{camera}-mount.html"))
+    _copy(told.report, report)
     if not keep:
         write_mount(config, camera, told.mount or {})
 
@@ -168,7 +172,7 @@ def _picture(told: Calibration) -> Text:
     rows = ["  ".join(FULL * 2 if cell else EMPTY * 2 for cell in row) for row in told.regions]
     done = round(BAR * told.progress)
     bar = f"[{FULL * done}{EMPTY * (BAR - done)}] {100 * told.progress:.0f} %, {told.views} pictures"
-    return Text("\n".join([*rows, bar, told.said]))
+    return Text("\n".join([*rows, bar, printable(told.said)]))
 
 
 def _show(told: Calibration) -> None:

@@ -16,6 +16,7 @@ import typer
 from pydantic import ValidationError
 from rich.prompt import Confirm
 from rich.table import Table
+from rich.text import Text
 
 from services import client, document
 from services.bus import Message
@@ -209,7 +210,7 @@ def _may_write(file: Path, old: Relation, fit: MapFit) -> bool:
     if not sys.stdin.isatty():
         raise ConfigError(["--yes: expected it where nobody can be asked: the robot's file changes"])
     far, turned = dist((old.x, old.y), (fit.x, fit.y)), abs((old.yaw_deg - fit.yaw_deg + 180) % 360 - 180)
-    return Confirm.ask(f"{file}: it changes by {far:.2f} m and {turned:.1f} deg. Write it?", console=out)
+    return Confirm.ask(Text(f"{file}: it changes by {far:.2f} m and {turned:.1f} deg. Write it?"), console=out)
 
 
 def _replace(file: Path, text: str) -> None:

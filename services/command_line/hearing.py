@@ -6,7 +6,7 @@ Not here: what is done with it (`watch.py`, `record.py`).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import typer
@@ -76,21 +76,27 @@ class Stopwatch:
         return self._stopped or (self._end is not None and time.monotonic() >= self._end)
 
 
-@contextmanager
-def listening(
-    settings: BusSettings, filters: Sequence[str]
-) -> Iterator[Callable[[Stopwatch], Iterator[list[Message]]]]:
-    """Yields what gives all that comes in batches, until the stopwatch says so; what was given is forgotten.
+class Batches:
+    """Called, it gives all that comes in batches, empty ones too, until the stopwatch says so; and forgets them."""
 
-    `filters` as `checked` gives them.
-    """
+    def __init__(self, bus: client.Client) -> None:
+        self._bus = bus
 
-    def batches(watch: Stopwatch) -> Iterator[list[Message]]:
+    def __call__(self, watch: Stopwatch) -> Iterator[list[Message]]:
         while not watch.over:
-            came = bus.pump(GLANCE_S)
-            bus.seen.clear()
+            came = self._bus.pump(GLANCE_S)
+            self._bus.seen.clear()
             yield came
 
+    @property
+    def connected(self) -> bool:
+        """Whether the broker is there."""
+        return self._bus.bus.connected
+
+
+@contextmanager
+def listening(settings: BusSettings, filters: Sequence[str]) -> Iterator[Batches]:
+    """Listens by these filters, as `checked` gives them."""
     with client.connected(settings) as bus:
         bus.subscribe(*filters)
-        yield batches
+        yield Batches(bus)

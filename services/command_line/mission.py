@@ -15,7 +15,7 @@ from rich.table import Table
 from services import client
 from services.bus import Message
 from services.client import Client
-from services.command_line.options import CONFIG, Config, Json, Marker, out
+from services.command_line.options import CONFIG, Config, Json, Marker, out, writable
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.payloads.robot import MissionOrder, MissionResult, MissionState, Where, WhereReply
@@ -39,13 +39,13 @@ def find(
     json: Json = False,
 ) -> None:
     """Find a marker and tell each step; exit 1 when it was not found."""
+    writable(plot, "--plot")
     with _robot(config, robot) as (bus, name):
-        say: Tell = (lambda _: None) if json else out.print
-        if plot is None:
-            result = _found(bus, name, marker, timeout_s, say)
-        else:
-            result = _drawn(bus, config, plot, lambda: _found(bus, name, marker, timeout_s, say), (name, marker))
+        draw = _drawing(bus, config, plot, (name, marker)) if plot is not None else None
+        result = _found(bus, name, marker, timeout_s, (lambda _: None) if json else out.print)
     out.print_json(result.model_dump_json()) if json else out.print(f"{result.state}: {result.reason}")
+    if draw is not None:
+        draw()
     if result.state != "found":
         raise typer.Exit(1)
 
@@ -119,17 +119,13 @@ def _found(bus: Client, robot: str, marker: int, timeout_s: float, tell: Tell) -
     return result
 
 
-def _drawn(
-    bus: Client, config: Path, file: Path, find: Callable[[], MissionResult], what: tuple[str, int]
-) -> MissionResult:
-    """The mission, and a picture of it."""
+def _drawing(bus: Client, config: Path, file: Path, what: tuple[str, int]) -> Callable[[], None]:
+    """Listens from now on to what a picture shows; what is returned draws it, once the mission has ended."""
     from services.command_line import mission_plot  # maps and pictures, for who wants one
 
     bus.subscribe(*mission_plot.FILTERS)
     told = mission_plot.Timeline(*what, time.time())
-    result = find()
-    mission_plot.write(file, load(config, ("mission",)), told, bus.seen)
-    return result
+    return lambda: mission_plot.write(file, load(config, ("mission",)), told, bus.seen)
 
 
 def _tell(state: MissionState, ours: str | None, tell: Tell) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from services.command_line.options import CONFIG, Unread, out
+from services.command_line.options import CONFIG, Unread, out, writable
 from services.errors import ConfigError
 
 Kind = Annotated[str, typer.Option("--board", help="charuco, or chessboard.")]
@@ -86,4 +86,5 @@ def _wrong(option: str) -> Iterator[None]:
 def _write(to: Path, png: Callable[[], bytes], pdf: Callable[[], bytes]) -> None:
     if to.suffix not in (".pdf", ".png"):
         raise ConfigError([f"--out: expected a .pdf or .png file, got {to}"])
+    writable(to, "--out")
     to.write_bytes(png() if to.suffix == ".png" else pdf())

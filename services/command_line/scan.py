@@ -19,7 +19,7 @@ from rich.table import Table
 from services import client
 from services.client import Client
 from services.command_line import completion
-from services.command_line.options import CONFIG, Camera, Config, Json, out
+from services.command_line.options import CONFIG, Camera, Config, Json, out, printable, writable
 from services.command_line.order import with_camera
 from services.config import load
 from services.payloads import OrderResult, ScanResult, ScanState
@@ -47,6 +47,7 @@ def scan(
     """Look for markers with a camera; exit 1 when one of them was not found."""
     from services.command_line import scanned  # it brings OpenCV
 
+    writable(plot, "--plot")
     apartment = with_camera(load(config), camera)
     wanted = list(dict.fromkeys([*target, *(more or [])]))
     filters = [row.filter_for(cam=camera) for row in scanned.HEARD]
@@ -68,13 +69,13 @@ def scan(
 @contextmanager
 def progress(screen: Console, *, quiet: bool = False) -> Iterator[Advance]:
     """A bar on a terminal, a line for each place elsewhere."""
-    columns = (TextColumn("  {task.description}"), BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn("  {task.description}", markup=False), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=screen, disable=quiet or not screen.is_terminal, transient=True) as bar:
         task = bar.add_task("scan", total=1.0)
         told: list[str] = []
 
         def advance(state: ScanState) -> None:
-            text = f"{state.place or state.state} ({state.frames_analysed} frames)"
+            text = printable(f"{state.place or state.state} ({state.frames_analysed} frames)")
             bar.update(task, completed=state.progress, description=text)
             place = state.place or ""
             if not quiet and not screen.is_terminal and place and place not in told:

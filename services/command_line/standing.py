@@ -5,6 +5,7 @@ Pure. Not here: listening and showing (`status.py`).
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -13,7 +14,7 @@ from typing import Any
 from services import topics
 from services.bus import Message
 from services.errors import BadMessage
-from services.payloads import CameraStatus, Diagnostic, OrderResult, Position, ScanState, ServiceInfo, stamp
+from services.payloads import CameraStatus, Diagnostic, OrderResult, Position, ScanState, ServiceInfo, seconds, stamp
 from services.payloads.robot import MissionResult, MissionState, RobotPose
 
 HEARD = (
@@ -24,6 +25,8 @@ HEARD = (
 FILTERS = tuple(row.filter for row in HEARD)
 KEPT = 12  # troubles that are shown
 LEVELS = ("ok", "warning", "error", "stale")
+STALE_S = 5.0  # without a diagnostic, which comes every second; as in diagnostic_aggregator
+POSE_S = 10.0  # a robot says where it is at least so often
 COUNTED = ("received", "published")
 
 
@@ -65,6 +68,7 @@ class Robot:
 
     mission: MissionState | None = None
     pose: RobotPose | None = None
+    posed: float = 0.0  # when it was there
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,15 @@ class Standing:
     robots: dict[str, Robot] = field(default_factory=dict)
     diagnostics: dict[str, tuple[float, Diagnostic]] = field(default_factory=dict)
     past: deque[Trouble] = field(default_factory=lambda: deque(maxlen=KEPT))
+    now: float = 0.0
+    listens: float = math.inf  # since when
+    gone: float | None = None  # since when there is no broker, while there is none
+
+    def look(self, now: float, *, connected: bool) -> None:
+        """What time it is, and whether the broker is there: to be told again and again."""
+        back = connected and (self.gone is not None or self.listens == math.inf)
+        self.now, self.listens = now, now if back else self.listens
+        self.gone = None if connected else self.gone or now
 
     @classmethod
     def of(cls, services: Iterable[str], cameras: Iterable[str]) -> Standing:
@@ -101,8 +114,22 @@ class Standing:
 
     @property
     def well(self) -> bool:
-        """Whether every service is online."""
-        return all(one.status == "online" for one in self.services.values())
+        """Whether the broker and every service is there."""
+        return self.gone is None and all(one.status == "online" for one in self.services.values())
+
+    def is_stale(self, service: Service) -> bool:
+        """Whether it is online, and should have said by now how it fares."""
+        heard = service.counted[0] if service.counted else 0.0
+        return service.status == "online" and self.now - max(heard, self.listens) > STALE_S
+
+    def away(self, name: str) -> str:
+        """How a service that is known is when it is not online, empty otherwise: what it said once is no more so."""
+        service = self.services.get(name)
+        return "" if service is None or service.status == "online" else f"service {service.status}"
+
+    def was_there(self, robot: Robot) -> bool:
+        """Whether its pose is an old one."""
+        return self.now - robot.posed > POSE_S
 
     def hear(self, message: Message) -> None:
         """Takes one message; what the table does not understand is none of ours."""
@@ -140,7 +167,7 @@ class Standing:
         if isinstance(said, MissionState):
             robot.mission = said
         elif isinstance(said, RobotPose):
-            robot.pose = said
+            robot.pose, robot.posed = said, _time(said.stamp) if message.retain else message.received
         elif isinstance(said, MissionResult) and said.state == "failed":
             self._trouble(f"mission/{name}", said.reason, message)
 
@@ -163,6 +190,13 @@ class Standing:
         present = [(name, *one) for name, one in self.diagnostics.items() if one[1].level]
         present.sort(key=lambda one: (-one[2].level, one[0]))
         return [*(_trouble_of(*one, now=True) for one in present), *reversed(self.past)][:KEPT]
+
+
+def _time(at: str) -> float:
+    try:
+        return seconds(at)
+    except (ValueError, OverflowError):
+        return 0.0
 
 
 def _number(text: str) -> float:

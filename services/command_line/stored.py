@@ -19,7 +19,7 @@ import typer
 from pydantic import ValidationError
 
 from services.command_line import completion
-from services.command_line.options import CONFIG, Config, Json
+from services.command_line.options import CONFIG, Config, Json, writable
 from services.config import Apartment, load
 from services.errors import ConfigError
 from services.payloads.history import HistoryGet
@@ -69,6 +69,7 @@ def history(
     if plot is not None:
         if plot.suffix not in command.SUFFIXES:
             raise ConfigError([f"--plot: expected a file in {' or '.join(command.SUFFIXES)}, got {str(plot)!r}"])
+        writable(plot, "--plot")
         plot.write_bytes(command.as_plot(address, asked, zone, plot.suffix))
         _say(f"{plot}")
         return

@@ -16,7 +16,7 @@ from rich.text import Text
 from services import process
 from services.bus import Message
 from services.command_line import hearing, recording
-from services.command_line.options import CONFIG, Config, Json, out
+from services.command_line.options import CONFIG, Config, Json, out, printable
 from services.config import load
 
 NARROW = 400  # characters of a message where there is no terminal whose width would say
@@ -75,11 +75,6 @@ def short(payload: bytes) -> str:
     except UnicodeDecodeError:
         return f"<{len(payload)} bytes>"
     return text if len(text) <= NARROW else f"{text[: NARROW - 1]}…"
-
-
-def printable(text: str) -> str:
-    """The text with an escape for each character that is none to look at: whoever publishes has no say over us."""
-    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
 
 
 def _is_json(payload: bytes) -> bool:

@@ -12,6 +12,7 @@ from services.payloads.robot import MissionEvent, MissionResult
 from services.storage import Item, Mission, Sample, Storage, reading
 
 US = 1_000_000
+MS = 1000  # in microseconds
 USUAL = 1000  # samples when nobody says how many
 MOST = 5000  # in one answer: it has to fit into a message of 256 KiB
 DAY_S = 86_400.0
@@ -101,9 +102,15 @@ def _samples(storage: Storage, item: Item, since: int, until: int, limit: int) -
 
 def _changes(storage: Storage, asked: HistoryGet, since: int, until: int, limit: int) -> HistoryReply:
     items = None if asked.item is None else [known(storage, asked.item)]
-    found = reading.changes(storage, since, until, items)[-limit:]
+    found, begin = reading.changes(storage, since, until, items)
+    if len(found) > limit:
+        found = found[-limit:]
+        begin = found[0].time
     changed = [(one.item, *_sample(one)) for one in found]
-    return HistoryReply(id=asked.id, item=asked.item, samples=[row[1:] for row in changed], changes=changed)
+    whole = None if begin == since else stamp(-(-begin // MS) * MS / US)  # a stamp has milliseconds: the next one
+    return HistoryReply(
+        id=asked.id, item=asked.item, samples=[row[1:] for row in changed], changes=changed, since=whole
+    )
 
 
 def _mission(one: Mission, ended: int) -> MissionResult:

@@ -11,7 +11,7 @@ import json
 import math
 import re
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from datetime import datetime, tzinfo
 
@@ -64,9 +64,24 @@ def every_s(text: str) -> float | None:
 def ask(address: Address, asked: HistoryGet) -> HistoryReply:
     """The answer; BadMessage when there is none."""
     with closing(open_ready(address)) as storage:
-        reply = answers.answer(storage, asked, time.time())
+        reply = _answer(storage, asked)
     if reply.error:
         raise BadMessage(reply.error)
+    return reply
+
+
+def _answer(storage: Storage, asked: HistoryGet) -> HistoryReply:
+    """Changes come in pieces, as one answer looks at so many samples only; the newest piece first."""
+    reply, most = answers.answer(storage, asked, time.time()), asked.limit or answers.USUAL
+    while reply.changes is not None and reply.since is not None and len(reply.changes) < most:
+        later = [row for row in reply.changes if row[1] >= reply.since]
+        further = asked.model_copy(update={"until": reply.since, "limit": most - len(later)})
+        before = answers.answer(storage, further, time.time())
+        if before.since == reply.since:  # more within a millisecond than it looks at
+            break
+        both = [*(before.changes or ()), *later]
+        found = {"samples": [row[1:] for row in both], "changes": both, "since": before.since}
+        reply = reply.model_copy(update=found)
     return reply
 
 
@@ -92,8 +107,8 @@ def is_empty(reply: HistoryReply) -> bool:
     return not (reply.samples or reply.durations)
 
 
-def rows(reply: HistoryReply) -> Iterator[tuple[str, ...]]:
-    """The answer as rows of text, the first with the names of the columns."""
+def rows(reply: HistoryReply, number: Callable[[float], str]) -> Iterator[tuple[str, ...]]:
+    """The answer as rows of text, the first with the names of the columns; `number` is the form of a mean."""
     unit = f" [{reply.unit}]" if reply.unit else ""
     if reply.durations is not None:
         yield "state", "seconds"
@@ -101,7 +116,7 @@ def rows(reply: HistoryReply) -> Iterator[tuple[str, ...]]:
     elif reply.buckets is not None:
         yield "time", "count", f"min{unit}", f"mean{unit}", f"max{unit}"
         for start, n, *numbers in reply.buckets:
-            yield start, str(n), *(f"{number:.6g}" for number in numbers)
+            yield start, str(n), *map(number, numbers)
     elif reply.changes is not None:
         yield "time", "item", "state"
         yield from ((when, item, str(state)) for item, when, state in reply.changes)
@@ -113,7 +128,7 @@ def rows(reply: HistoryReply) -> Iterator[tuple[str, ...]]:
 def table(reply: HistoryReply, zone: tzinfo) -> Iterator[str]:
     """The answer as aligned lines, times on the home's clock; nothing where nothing was found."""
     if not is_empty(reply):
-        yield from aligned(rows(reply), zone)
+        yield from aligned(rows(reply, "{:.6g}".format), zone)
 
 
 def aligned(texts: Iterable[tuple[str, ...]], zone: tzinfo) -> Iterator[str]:
@@ -131,8 +146,8 @@ def _local(cell: str, zone: tzinfo) -> str:
 
 
 def as_csv(reply: HistoryReply) -> str:
-    """With a line of names; times in UTC."""
-    return comma_separated(rows(reply))
+    """With a line of names; times in UTC, numbers with every digit."""
+    return comma_separated(rows(reply, repr))
 
 
 def comma_separated(texts: Iterable[tuple[str, ...]]) -> str:

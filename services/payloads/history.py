@@ -30,7 +30,9 @@ class HistoryGet(Payload):
 class HistoryReply(Payload):
     """`history/reply/<id>`: the answer; samples oldest first, `unit` that of their numbers.
 
-    `buckets` with `every`: begin, count, least, mean, greatest. `changes`: item, time, state. `durations`: seconds.
+    `buckets` with `every`: begin, count, least, mean, greatest. `changes`: item, time, state; `since`: from when on
+    they are all there, where the span has more: ask again `until` then, and leave out what is older here. `durations`:
+    seconds.
     `missions`: the robot, and the result as it was told on `mission/<robot>/result`.
     """
 
@@ -40,6 +42,7 @@ class HistoryReply(Payload):
     unit: str | None = None
     buckets: list[tuple[str, int, float, float, float]] | None = None
     changes: list[tuple[str, str, float | str]] | None = None
+    since: str | None = None
     durations: dict[str, float] | None = None
     missions: list[tuple[str, MissionResult]] | None = None
     error: str | None = None

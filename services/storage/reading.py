@@ -19,6 +19,7 @@ YEAR_0_TO_1970_S = (
 )
 AGGREGATES = "COUNT(s.num), MIN(s.num), AVG(s.num), MAX(s.num) FROM sample s"
 PIECE = 50  # buckets asked for at once; SQLite joins no more than 500 questions
+LOOKED_AT = 10_000  # samples at once, for what changed: a tenth of a second
 CROWD = 150  # samples in a bucket: from there on a range for each is quicker than groups
 
 
@@ -95,25 +96,27 @@ def all_before(storage: Storage, until: int) -> dict[str, Sample]:
 
 
 def changes(
-    storage: Storage, since: int, until: int, items: Iterable[Item] | None = None, limit: int = 10_000
-) -> list[Sample]:
+    storage: Storage, since: int, until: int, items: Iterable[Item] | None = None, limit: int = LOOKED_AT
+) -> tuple[list[Sample], int]:
     """What changed in a span: samples that differ from the one before of the same item, oldest first.
 
-    Of a span with more than `limit` samples the newest are looked at.
+    Of a span with more than `limit` samples the newest are looked at. With it from when on: the span's begin, or
+    later where there was more to look at.
     """
     wanted = None if items is None else [item.item_id for item in items]
-    if wanted == []:
-        return []
-    rows = _between(storage, since, until, wanted, limit)
+    rows = [] if wanted == [] else _between(storage, since, until, wanted, limit)
     if not rows:
-        return []
-    last = {name: (one.num, one.text) for name, one in all_before(storage, rows[0].time).items()}
+        return [], since
+    if len(rows) >= limit:
+        since = rows[0].time + 1  # others of that very moment may be missing
+        rows = [row for row in rows if row.time >= since]
+    last = {name: (one.num, one.text) for name, one in all_before(storage, since).items()}
     changed = []
     for row in rows:
         if last.get(row.item) != (row.num, row.text):
             last[row.item] = (row.num, row.text)
             changed.append(row)
-    return changed
+    return changed, since
 
 
 def _between(storage: Storage, since: int, until: int, items: list[int] | None, limit: int) -> list[Sample]:

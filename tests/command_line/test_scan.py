@@ -117,6 +117,29 @@ def test_as_data_each_marker_that_was_found_is_a_line(config: Path, camera: Clie
     assert (code, told) == (1, {582: "Sofa", 17: "TV"})
 
 
+def test_a_place_is_shown_as_it_is_named(config: Path, camera: Client) -> None:
+    """Both on the way and in the table."""
+    with apartment(config, "scan", "ip1", "--target", "582") as terminal:
+        order = taken(camera, "Scan")
+        answer(camera, "Scan", order, "running")
+        for place in ("TV [old]", "Sofa [/b]"):
+            camera.say("camera/ip1/scan/state", ScanState(state="running", place=place).model_dump_json(), retain=True)
+            camera.pump()
+            assert terminal.line() == f"  looking from {place}"
+        camera.say("camera/ip1/scan/result", seen(582, "TV [old]", "09.500").model_dump_json())
+        answer(camera, "Scan", order, "done")
+        camera.pump()
+        assert terminal.ended() == 0
+    assert "TV [old]" in "".join(terminal.rest())
+
+
+def test_a_place_that_looks_like_markup_is_no_markup_on_the_bar() -> None:
+    console = screen(terminal=True)
+    with progress(console) as advance:
+        advance(ScanState(state="running", place="Sofa [/b] [old]\x1b[2J", progress=0.5, frames_analysed=7))
+    assert "Sofa [/b] [old]\\x1b[2J (7 frames)" in text(console)
+
+
 @pytest.mark.parametrize("words", ["", "582", "--target", "--target sofa", "--target 582 sofa"])
 def test_a_scan_without_markers_is_wrong_usage(words: str, config: Path) -> None:
     assert done(config, "scan", "ip1", *words.split())[0] == 2

@@ -103,6 +103,25 @@ def test_changes_of_all_items(site: Path) -> None:
     assert "Light" in run(site, "--what", "changes", "--since", "3h", "--limit", "200", "--csv").replace(",", " ")
 
 
+def test_changes_are_found_behind_many_samples_that_are_none(site: Path) -> None:
+    storage = open_storage("sqlite:///bus.db", site.parent)
+    now = round(time.time() * 1e6)
+    storage.write(Batch([Sample("Light", now - HOUR_US + n * 100_000, 0.0, "OFF") for n in range(1, 25_001)]))
+    storage.close()
+    lines = run(site, "Light", "--what", "changes", "--since", "3h", "--limit", "3", "--csv").splitlines()
+    assert [line.rpartition(",")[2] for line in lines] == ["state", "ON", "OFF"]
+
+
+def test_comma_separated_values_have_every_digit_and_the_table_those_that_people_read(site: Path) -> None:
+    storage = open_storage("sqlite:///bus.db", site.parent)
+    storage.add_items([Item("Meter", "Number", "kWh")])
+    storage.write(Batch([Sample("Meter", round(time.time() * 1e6) - HOUR_US, 12345.678, None)]))
+    storage.close()
+    asked = ("Meter", "--since", "2h", "--every", "1d")
+    assert run(site, *asked, "--csv").splitlines()[1].split(",")[1:] == ["1", "12345.678", "12345.678", "12345.678"]
+    assert run(site, *asked).splitlines()[1].split()[-3:] == ["12345.7"] * 3
+
+
 def test_nothing_found_ends_with_one(site: Path) -> None:
     assert run(site, "Lab", "--until", "2020-01-01", code=1).strip() == ""
 

@@ -71,7 +71,8 @@ def test_the_state_before_a_time(storage: Storage, item: str, clock: str, state:
 
 
 def test_what_changed_between_two_times(storage: Storage) -> None:
-    found = reading.changes(storage, us("07:10"), us("07:20"))
+    found, since = reading.changes(storage, us("07:10"), us("07:20"))
+    assert since == us("07:10")
     assert [(one.item, *clocks([one])[0]) for one in found] == [
         ("Front_Door", "07:14:58", "OPEN"),
         ("Kitchen_Light", "07:15:00.250", "ON"),
@@ -81,9 +82,34 @@ def test_what_changed_between_two_times(storage: Storage) -> None:
 
 def test_a_repeated_value_is_no_change_even_at_the_beginning_of_a_span(storage: Storage) -> None:
     lab = [storage.items["Lab_Temp"]]
-    assert clocks(reading.changes(storage, us("08:10"), us("09:30"), lab)) == [("08:30:00.250", 21.0)]
-    assert reading.changes(storage, us("08:59"), us("09:30"), lab) == []
-    assert reading.changes(storage, us("08:59"), us("09:30"), []) == []
+    assert clocks(reading.changes(storage, us("08:10"), us("09:30"), lab)[0]) == [("08:30:00.250", 21.0)]
+    assert reading.changes(storage, us("08:59"), us("09:30"), lab) == ([], us("08:59"))
+    assert reading.changes(storage, us("08:59"), us("09:30"), []) == ([], us("08:59"))
+
+
+def test_where_more_is_stored_than_is_looked_at_it_is_said_from_when_on(storage: Storage) -> None:
+    lab = [storage.items["Lab_Temp"]]
+    found, since = reading.changes(storage, us("06:00"), us("09:30"), lab, limit=3)
+    assert (clocks(found), since) == ([("08:30:00.250", 21.0)], us("08:00") + 1)
+    found, since = reading.changes(storage, us("06:00"), us("09:30"), lab, limit=100)
+    assert (len(found), since) == (6, us("06:00"))
+
+
+@pytest.mark.parametrize("limit", [3, 4, 7])
+def test_changes_asked_for_piece_by_piece_are_each_told_once(own_storage: Storage, limit: int) -> None:
+    """Also those that a time in milliseconds cannot tell apart."""
+    begin = us("09:10")
+    times = [begin + step for step in (0, 1, 400, 1000, 1001, 2500, 60_000_000, 60_000_700)]
+    wanted = [("ON", "OFF")[number % 2] for number in range(len(times))]
+    own_storage.write(Batch([Sample("Kitchen_Light", at, None, told) for at, told in zip(times, wanted, strict=True)]))
+    until, found = stamp(at("10:00")), list[tuple[str, object]]()
+    while until is not None:
+        question = {"item": "Kitchen_Light", "what": "changes", "since": stamp(at("09:00"))}
+        reply = ask(own_storage, **question, until=until, limit=limit)
+        found[:0] = [row for row in reply.samples if reply.since is None or row[0] >= reply.since]
+        assert reply.since != until
+        until = reply.since
+    assert [told for _, told in found] == wanted
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,10 @@ POINTS = 800  # of a plot, when nobody says how many
 MOST_POINTS = 1500  # more do not fit into an answer of the bus
 PAST_MISSIONS = 40  # of all robots; each with its story
 EARLIEST = seconds("0001-01-01T00:00:00Z")  # there is no day before
+PIECE = 2000  # changes in one answer of the bus; of long texts fewer fit
+MOST_PIECES = 60  # of one item, and a look at 10,000 samples each: a year of one a minute
+MOST_STATES, MOST_LINES = 20_000, 100_000  # at once: for a page, in a table
+TOO_LONG = "too long an answer"  # what the history service says of one that does not fit
 NUMBERS = ("Number", "Dimmer", "Rollershutter")
 WIDTHS_S = (
     1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400,
@@ -29,13 +33,14 @@ WIDTHS_S = (
 
 class Series(BaseModel):
     """What was of an item. A row of numbers is time (s since 1970), least, mean and greatest of `every` seconds; a
-    row of states is time and state, at each change."""
+    row of states is time and state, at each change, first of all the state as of `known`."""
 
     item: str
     unit: str | None
     every: int | None = Field(description="Seconds per row; null: states, each as it was said.")
     since: float
     until: float
+    known: float = Field(description="From when on it is told: later than `since` where there was too much to tell.")
     rows: list[tuple[float, float, float, float]] | list[tuple[float, str | float]]
 
 
@@ -49,17 +54,7 @@ def endpoints(house: House) -> list[Endpoint]:
     """The rows."""
 
     async def history(asked: Asked) -> BaseModel:
-        item, since, until = asked.path("item"), *_span(asked)
-        known = house.config.home.items.get(item)
-        if known is None:
-            raise BadMessage(f"the home has no item {item[:80]!r}")
-        if base_type(known.type) in NUMBERS:
-            return await _numbers(house, item, since, until, _points(asked))
-        reply = _good(await house.ask(item=item, what="changes", since=stamp(since), until=stamp(until), limit=4000))
-        before = _good(await house.ask(item=item, what="last", until=stamp(since)))
-        rows: list[tuple[float, str | float]] = [(since, value) for _, value in before.samples]
-        rows += [(seconds(when), value) for when, value in reply.samples]
-        return Series(item=item, unit=None, every=None, since=since, until=until, rows=rows)
+        return await _series(house, asked, MOST_STATES)
 
     async def missions(asked: Asked) -> BaseModel:
         robot = asked.path("robot")
@@ -67,8 +62,9 @@ def endpoints(house: House) -> list[Endpoint]:
         return Missions(missions=[result for name, result in reply.missions or () if name == robot])
 
     async def table(asked: Asked) -> Response:
-        series = await history(asked)
-        assert isinstance(series, Series)
+        series = await _series(house, asked, MOST_LINES)
+        if series.known > series.since:
+            raise BadMessage(f"too much for one table: ask from since={stamp(series.known)} on, or a part at a time")
         return Response(
             _csv(series), 200, {"content-disposition": f'attachment; filename="{series.item}.csv"'}, "text/csv"
         )
@@ -84,11 +80,45 @@ def endpoints(house: House) -> list[Endpoint]:
     ]  # fmt: skip
 
 
+async def _series(house: House, asked: Asked, most: int) -> Series:
+    item, since, until = asked.path("item"), *_span(asked)
+    about = house.config.home.items.get(item)
+    if about is None:
+        raise BadMessage(f"the home has no item {item[:80]!r}")
+    if base_type(about.type) in NUMBERS:
+        return await _numbers(house, item, since, until, _points(asked))
+    changes, known = await _changes(house, item, since, until, most)
+    before = _good(await house.ask(item=item, what="last", until=stamp(known)))
+    rows: list[tuple[float, str | float]] = [(known, value) for _, value in before.samples]
+    return Series(item=item, unit=None, every=None, since=since, until=until, known=known, rows=rows + changes)
+
+
+async def _changes(
+    house: House, item: str, since: float, until: float, most: int
+) -> tuple[list[tuple[float, str | float]], float]:
+    """The newest changes, and from when on these are all; asked for in pieces, from the newest one back."""
+    found: list[tuple[float, str | float]] = []
+    end, piece = stamp(until), PIECE
+    for _ in range(MOST_PIECES):
+        reply = await house.ask(item=item, what="changes", since=stamp(since), until=end, limit=piece)
+        if TOO_LONG in (reply.error or "") and piece > 1:
+            piece //= 2
+            continue
+        begin = _good(reply).since
+        found[:0] = [(seconds(when), value) for when, value in reply.samples if begin is None or when >= begin]
+        if begin is None:
+            return found, since
+        if len(found) >= most or begin == end:
+            return found, seconds(begin)
+        end = begin
+    return found, seconds(end)
+
+
 async def _numbers(house: House, item: str, since: float, until: float, points: int) -> Series:
     every = width(until - since, points)
     reply = _good(await house.ask(item=item, since=stamp(since), until=stamp(until), every=float(every)))
     rows = [(seconds(when), lo, mean, hi) for when, _, lo, mean, hi in reply.buckets or ()]
-    return Series(item=item, unit=reply.unit, every=every, since=since, until=until, rows=rows)
+    return Series(item=item, unit=reply.unit, every=every, since=since, until=until, known=since, rows=rows)
 
 
 def width(span_s: float, points: int) -> int:
@@ -136,7 +166,7 @@ def _csv(series: Series) -> str:
 def _cell(value: object) -> str:
     """Quoted as RFC 4180 wants; a text that a spreadsheet would take for a formula is shown as text."""
     if isinstance(value, float | int):
-        return f"{value:g}"
+        return repr(float(value)).removesuffix(".0")  # every digit
     text = str(value)
     if text[:1] in "=+-@\t\r":
         text = f"'{text}"

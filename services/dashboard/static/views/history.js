@@ -89,6 +89,7 @@ export function show(root, { apartment }) {
     if (mine !== turn) return;
     const states = found.filter((one) => !one.fault && !NUMBERS.has(apartment.items[one.item].type));
     plots.append(...states.map((one) => strip(one, apartment.items[one.item], since, until)));
+    for (const one of states.filter((series) => series.known > series.since)) plots.append(h("p", { class: "why" }, `${apartment.items[one.item].label}: too much for one plot, shown from ${new Date(one.known * 1000).toLocaleString()} on`));
     if (!names.length) plots.append(h("p", { class: "empty" }, "Choose items to see what was."));
     plots.setAttribute("aria-busy", "false");
   }
