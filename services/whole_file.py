@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
 PRIVATE = 0o600
+AS_FOLDER = 0o664  # of its folder's mode, what a new file of root's has: nothing is for everybody to write
 
 
 @contextmanager
@@ -20,7 +21,7 @@ def whole_file(file: Path, *, mode: int | None = None, like: Path | None = None)
     What root writes belongs to whom it belonged, or to whom the folder does: a service reads what a restore wrote.
     """
     real, model = file.resolve(), like or file
-    _make(real.parent)
+    make_folder(real.parent)
     owner = (real if real.exists() else real.parent).stat()
     if mode is None and model.exists():
         mode = model.stat().st_mode & 0o777
@@ -39,14 +40,27 @@ def whole_file(file: Path, *, mode: int | None = None, like: Path | None = None)
         beside.unlink(missing_ok=True)
 
 
-def _make(folder: Path) -> None:
-    """With the folders that it is in; they belong to whom the first one does that was there."""
+def make_folder(folder: Path) -> None:
+    """With the folders that it is in; they belong to whom the first one does that was there. OSError."""
     missing = [one for one in (folder, *folder.parents) if not one.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     if missing and os.geteuid() == 0:
         owner = missing[-1].parent.stat()
         for one in missing:
             os.chown(one, owner.st_uid, owner.st_gid)
+
+
+def make_empty(file: Path) -> None:
+    """A file that others fill, where there is none. Root's is its folder's: who may write there writes it. OSError."""
+    with suppress(FileExistsError):
+        made = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        try:
+            if os.geteuid() == 0:
+                folder = file.parent.stat()
+                os.fchown(made, folder.st_uid, folder.st_gid)
+                os.fchmod(made, folder.st_mode & AS_FOLDER)
+        finally:
+            os.close(made)
 
 
 def write_whole(file: Path, content: str | bytes, *, mode: int | None = None, like: Path | None = None) -> None:

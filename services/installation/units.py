@@ -182,7 +182,7 @@ def users(parts: Iterable[Part]) -> str:
 
 def folders(parts: Iterable[Part]) -> str:
     """tmpfiles.d: what the services share; a new file there belongs to the group."""
-    lines = [f"d {STATE} 2770 root {GROUP} -"]
+    lines = [f"d {STATE} 2770 root {GROUP} -", f"z {STATE}/* ~2770 - {GROUP} -"]  # a database of SQLite is there too
     for place in dict.fromkeys(path for part in parts for path in written(part)):
         lines += [f"d {place} 2770 root {GROUP} -", f"Z {place} ~2770 root {GROUP} -"]
     return "\n".join(lines) + "\n"
