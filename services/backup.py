@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from services import __version__
 from services.config import Apartment
 from services.errors import ConfigError
-from services.storage import Address, dump, open_storage, upkeep
+from services.storage import Address, Storage, dump, open_plain, open_storage, upkeep
 from services.whole_file import PRIVATE, whole_file, write_whole
 
 FORM = 1  # of the archive
@@ -109,6 +109,29 @@ def _inside(one: zipfile.ZipInfo, begin: str) -> PurePosixPath:
     return path
 
 
+def expect_empty(database: Address, *, made_later: bool) -> None:
+    """ConfigError when it has rows, with what empties it, or when it cannot be opened and is not to be made later."""
+    made_later = made_later or (database.dialect == "sqlite" and not database.path.exists())
+    try:
+        storage = open_plain(database)
+    except ConfigError:
+        if made_later:
+            return
+        raise
+    with closing(storage):
+        _expect_empty(storage, database)
+
+
+def _expect_empty(storage: Storage, database: Address) -> None:
+    if (table := dump.occupied(storage)) is None:
+        return
+    how = f"sudo rm {database.path}*"
+    if database.dialect == "mysql":
+        names = "; ".join(f"DROP DATABASE IF EXISTS {one}" for one in (database.database, database.view_database))
+        how = f"sudo mariadb -e '{names}', and then restore with --init"
+    raise ConfigError([f"{database}: expected an empty one, got rows in {table}. If nobody needs them any more: {how}"])
+
+
 def put_rows_back(file: Path, database: Address) -> Iterator[str]:
     """Writes all rows into an empty database, which is made where it is missing; nothing where the backup has none."""
     told = manifest(file)
@@ -118,6 +141,7 @@ def put_rows_back(file: Path, database: Address) -> Iterator[str]:
         with closing(open_storage(database)) as storage, archive.open(DATABASE) as lines:
             if int(told["schema"]) > (own := upkeep.version(storage)):
                 raise ConfigError([f"{file}: its schema has version {told['schema']}, this program knows {own}"])
+            _expect_empty(storage, database)
             counted = dump.put_back(storage, (line.decode() for line in lines))
     with closing(open_storage(database)) as storage:  # it learns the items
         storage.remake_views()
