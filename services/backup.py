@@ -11,7 +11,7 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import closing
 from datetime import UTC, datetime
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 
 from services import __version__
 from services.config import Apartment
@@ -23,6 +23,8 @@ FORM = 1  # of the archive
 DATABASE = "database.jsonl"
 CONFIG, STATE = "config/", "state/"
 CLIENT = "client"  # who a service is to the broker, in its folder (`process.py`): its own, and nobody else's to know
+PRIVATE_PARTS = ("secrets", "broker", "secrets.yaml")  # of the configuration's folder
+CERTIFICATES = (".crt", ".key", ".pem")  # of this machine; those of another one would not fit its authority
 LARGEST = 1 << 30  # bytes of one file that is put back; a small archive may claim to hold a large one
 
 
@@ -33,7 +35,7 @@ def save(file: Path, apartment: Apartment, database: Address | None) -> Iterator
         zipfile.ZipFile(output, "w", zipfile.ZIP_DEFLATED, strict_timestamps=False) as archive,
     ):
         yield from _save_parts(archive, apartment, database)
-    yield f"{file}: {file.stat().st_size} bytes, without passwords"
+    yield f"{file}: {file.stat().st_size} bytes, without passwords and certificates"
 
 
 def _save_parts(archive: zipfile.ZipFile, apartment: Apartment, database: Address | None) -> Iterator[str]:
@@ -60,13 +62,16 @@ def _files(folder: Path, but: tuple[Path, ...], database: Address | None) -> lis
     for path in sorted(folder.rglob("*")) if folder.is_dir() else ():
         inner = path.relative_to(folder)
         hidden = any(part.startswith(".") for part in inner.parts)
-        secret = inner.parts[0] in ("secrets", "broker", "secrets.yaml")
-        secret = secret or path.name == CLIENT
-        if not path.is_file() or path.is_symlink() or hidden or secret or any(map(path.is_relative_to, but)):
+        if not path.is_file() or path.is_symlink() or hidden or _secret(inner) or any(map(path.is_relative_to, but)):
             continue
         if stored is None or not path.name.startswith(stored):
             found.append(path)
     return found
+
+
+def _secret(inner: PurePath) -> bool:
+    """Whether a file of a folder is this installation's alone: passwords, certificates and keys, who a service is."""
+    return inner.parts[0] in PRIVATE_PARTS or inner.name == CLIENT or inner.suffix in CERTIFICATES
 
 
 def manifest(file: Path) -> dict[str, str]:
@@ -82,10 +87,15 @@ def manifest(file: Path) -> dict[str, str]:
 
 
 def put_files_back(file: Path, begin: str, folder: Path, *, force: bool = False) -> Iterator[str]:
-    """Writes the files of a part; one that is there and says something else is a fault, or with `force` replaced."""
+    """Writes the files of a part; one that is there and says something else is a fault, or with `force` replaced.
+
+    Certificates and keys, which older programs saved too, are not put back.
+    """
     with zipfile.ZipFile(file) as archive:
-        wanted = [one for one in archive.infolist() if one.filename.startswith(begin) and not one.is_dir()]
-        targets = {one.filename: folder / _inside(one, begin) for one in wanted}
+        there = [one for one in archive.infolist() if one.filename.startswith(begin) and not one.is_dir()]
+        inner = {one.filename: _inside(one, begin) for one in there}
+        wanted = [one for one in there if not _secret(inner[one.filename])]
+        targets = {one.filename: folder / inner[one.filename] for one in wanted}
         if not force:
             other = [
                 path

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from services import backup
+from services.config import load
 from services.errors import ConfigError
 from services.storage import (
     Address,
@@ -229,6 +230,35 @@ def test_who_a_service_is_to_the_broker_is_not_in_a_backup(tmp_path: Path) -> No
         names = archive.namelist()
     assert names
     assert not [name for name in names if name.endswith("/client")]
+
+
+def test_no_password_and_no_key_of_an_installation_is_in_a_backup(tmp_path: Path) -> None:
+    words = ["install", "--systemd", "--root", str(tmp_path), "--config", str(ROOT / "config/apartment.yaml")]
+    subprocess.run([sys.executable, "-m", "services", *words], check=True, capture_output=True, timeout=120)
+    made = tmp_path / "etc/apartment"
+    values = {file.read_text() for file in (made / "secrets/credentials").iterdir()}
+    values |= {file.read_text() for file in made.rglob("*.*") if file.suffix in (".key", ".crt")}
+    assert len(values) > 12
+    environment = {"APARTMENT_SECRETS": str(made / "secrets/secrets.yaml")}
+    apartment = load(made / "apartment.yaml", ("persistence",), environment)
+    list(backup.save(tmp_path / "all.zip", apartment, None))
+    with zipfile.ZipFile(tmp_path / "all.zip") as archive:
+        texts = {name: archive.read(name).decode(errors="replace") for name in archive.namelist()}
+    assert "config/apartment.yaml" in texts
+    assert "config/ip1/preset_position.yaml" in texts
+    assert not [name for name, text in texts.items() if any(value in text for value in values)]
+
+
+@pytest.mark.parametrize(
+    "name", ["ca.crt", "dashboard.key", "database/server.key", "broker/passwords", "secrets/secrets.yaml"]
+)
+def test_a_key_in_an_older_backup_is_not_put_over_that_of_this_machine(tmp_path: Path, name: str) -> None:
+    file, mine = forged(tmp_path, f"config/{name}", "of the old machine"), tmp_path / "home" / name
+    mine.parent.mkdir(parents=True)
+    mine.write_text("of this machine")
+    list(backup.put_files_back(file, backup.CONFIG, tmp_path / "home"))
+    list(backup.put_files_back(file, backup.CONFIG, tmp_path / "home", force=True))
+    assert mine.read_text() == "of this machine"
 
 
 def forged(folder: Path, name: str, text: str) -> Path:
