@@ -44,6 +44,9 @@ class Machine:
     def user(self, name: str) -> int:
         return next(int(line.split(":")[2]) for line in self._lines("passwd") if line.startswith(f"{name}:"))
 
+    def name(self, user: int) -> str:
+        return next(line.split(":")[0] for line in self._lines("passwd") if line.split(":")[2] == str(user))
+
     @property
     def group(self) -> int:
         return next(int(line.split(":")[2]) for line in self._lines("group") if line.startswith("apartment:"))
@@ -70,3 +73,28 @@ def test_a_database_of_sqlite_from_before_is_for_all_services(machine: Machine) 
     machine.install()
     assert (mode(file), file.stat().st_gid) == (0o660, machine.group)
     assert file.stat().st_uid == machine.user("apartment-persistence")
+
+
+def test_services_that_come_to_share_a_process_or_leave_it_still_read_what_is_theirs_alone(machine: Machine) -> None:
+    alone = machine.config.read_text()
+    kept = {name: machine.state / name / "client" for name in ("persistence", "history", "camera-ip1")}
+    for name, file in kept.items():
+        file.parent.mkdir()
+        file.write_text(name)
+        file.chmod(0o600)
+        for path in (file.parent, file):
+            os.chown(path, machine.user(f"apartment-{name}"), machine.group)
+
+    def owners() -> set[str]:
+        assert {mode(file) for file in kept.values()} == {0o600}
+        found = {name: {file.stat().st_uid, file.parent.stat().st_uid} for name, file in kept.items()}
+        return {f"{name}: {machine.name(one)}" for name, those in found.items() for one in those}
+
+    separate = {"persistence: apartment-persistence", "history: apartment-history", "camera-ip1: apartment-camera-ip1"}
+    assert owners() == separate
+    machine.config.write_text(f"grouped: true\n{alone}")
+    machine.install()
+    assert owners() == {"persistence: apartment-light", "history: apartment-light", "camera-ip1: apartment-camera-ip1"}
+    machine.config.write_text(alone)
+    machine.install()
+    assert owners() == separate
