@@ -11,18 +11,20 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import closing
 from datetime import UTC, datetime
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 
 from services import __version__
 from services.config import Apartment
 from services.errors import ConfigError
-from services.storage import Address, dump, open_storage, upkeep
+from services.storage import Address, Storage, dump, open_plain, open_storage, upkeep
 from services.whole_file import PRIVATE, whole_file, write_whole
 
 FORM = 1  # of the archive
 DATABASE = "database.jsonl"
 CONFIG, STATE = "config/", "state/"
 CLIENT = "client"  # who a service is to the broker, in its folder (`process.py`): its own, and nobody else's to know
+PRIVATE_PARTS = ("secrets", "broker", "secrets.yaml")  # of the configuration's folder
+CERTIFICATES = (".crt", ".key", ".pem")  # of this machine; those of another one would not fit its authority
 LARGEST = 1 << 30  # bytes of one file that is put back; a small archive may claim to hold a large one
 
 
@@ -33,7 +35,7 @@ def save(file: Path, apartment: Apartment, database: Address | None) -> Iterator
         zipfile.ZipFile(output, "w", zipfile.ZIP_DEFLATED, strict_timestamps=False) as archive,
     ):
         yield from _save_parts(archive, apartment, database)
-    yield f"{file}: {file.stat().st_size} bytes, without passwords"
+    yield f"{file}: {file.stat().st_size} bytes, without passwords and certificates"
 
 
 def _save_parts(archive: zipfile.ZipFile, apartment: Apartment, database: Address | None) -> Iterator[str]:
@@ -60,13 +62,16 @@ def _files(folder: Path, but: tuple[Path, ...], database: Address | None) -> lis
     for path in sorted(folder.rglob("*")) if folder.is_dir() else ():
         inner = path.relative_to(folder)
         hidden = any(part.startswith(".") for part in inner.parts)
-        secret = inner.parts[0] in ("secrets", "broker", "secrets.yaml")
-        secret = secret or path.name == CLIENT
-        if not path.is_file() or path.is_symlink() or hidden or secret or any(map(path.is_relative_to, but)):
+        if not path.is_file() or path.is_symlink() or hidden or _secret(inner) or any(map(path.is_relative_to, but)):
             continue
         if stored is None or not path.name.startswith(stored):
             found.append(path)
     return found
+
+
+def _secret(inner: PurePath) -> bool:
+    """Whether a file of a folder is this installation's alone: passwords, certificates and keys, who a service is."""
+    return inner.parts[0] in PRIVATE_PARTS or inner.name == CLIENT or inner.suffix in CERTIFICATES
 
 
 def manifest(file: Path) -> dict[str, str]:
@@ -82,10 +87,15 @@ def manifest(file: Path) -> dict[str, str]:
 
 
 def put_files_back(file: Path, begin: str, folder: Path, *, force: bool = False) -> Iterator[str]:
-    """Writes the files of a part; one that is there and says something else is a fault, or with `force` replaced."""
+    """Writes the files of a part; one that is there and says something else is a fault, or with `force` replaced.
+
+    Certificates and keys, which older programs saved too, are not put back.
+    """
     with zipfile.ZipFile(file) as archive:
-        wanted = [one for one in archive.infolist() if one.filename.startswith(begin) and not one.is_dir()]
-        targets = {one.filename: folder / _inside(one, begin) for one in wanted}
+        there = [one for one in archive.infolist() if one.filename.startswith(begin) and not one.is_dir()]
+        inner = {one.filename: _inside(one, begin) for one in there}
+        wanted = [one for one in there if not _secret(inner[one.filename])]
+        targets = {one.filename: folder / inner[one.filename] for one in wanted}
         if not force:
             other = [
                 path
@@ -109,6 +119,29 @@ def _inside(one: zipfile.ZipInfo, begin: str) -> PurePosixPath:
     return path
 
 
+def expect_empty(database: Address, *, made_later: bool) -> None:
+    """ConfigError when it has rows, with what empties it, or when it cannot be opened and is not to be made later."""
+    made_later = made_later or (database.dialect == "sqlite" and not database.path.exists())
+    try:
+        storage = open_plain(database)
+    except ConfigError:
+        if made_later:
+            return
+        raise
+    with closing(storage):
+        _expect_empty(storage, database)
+
+
+def _expect_empty(storage: Storage, database: Address) -> None:
+    if (table := dump.occupied(storage)) is None:
+        return
+    how = f"sudo rm {database.path}*"
+    if database.dialect == "mysql":
+        names = "; ".join(f"DROP DATABASE IF EXISTS {one}" for one in (database.database, database.view_database))
+        how = f"sudo mariadb -e '{names}', and then restore with --init"
+    raise ConfigError([f"{database}: expected an empty one, got rows in {table}. If nobody needs them any more: {how}"])
+
+
 def put_rows_back(file: Path, database: Address) -> Iterator[str]:
     """Writes all rows into an empty database, which is made where it is missing; nothing where the backup has none."""
     told = manifest(file)
@@ -118,6 +151,7 @@ def put_rows_back(file: Path, database: Address) -> Iterator[str]:
         with closing(open_storage(database)) as storage, archive.open(DATABASE) as lines:
             if int(told["schema"]) > (own := upkeep.version(storage)):
                 raise ConfigError([f"{file}: its schema has version {told['schema']}, this program knows {own}"])
+            _expect_empty(storage, database)
             counted = dump.put_back(storage, (line.decode() for line in lines))
     with closing(open_storage(database)) as storage:  # it learns the items
         storage.remake_views()

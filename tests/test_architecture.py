@@ -81,7 +81,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "services.bus.outbox": CORE,
     "services.ros": ("services.errors",),
     "services.vision": ("services.errors",),
-    "services.storage": ("services.errors", "services.section"),
+    "services.storage": ("services.errors", "services.section", "services.whole_file"),
     "services.document": ("services.errors", "services.whole_file"),
     "services.secret_store": ("services.errors", "services.document"),
     "services.registry": (),

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from services import backup
+from services.config import load
 from services.errors import ConfigError
 from services.storage import (
     Address,
@@ -153,6 +154,56 @@ def test_backup_wipe_restore_gives_everything_back_as_it_was(
     assert "expected an empty one" in again.stderr
 
 
+def test_where_rows_are_in_the_way_nothing_is_written_and_the_way_out_is_told(
+    tmp_path: Path, database: Database, request: pytest.FixtureRequest
+) -> None:
+    home = Home(tmp_path / "home", database)
+    assert home.run("backup", str(tmp_path / "all.zip")).returncode == 0
+    (home.folder / "config/ip1/preset_position.yaml").write_text("Sofa: [9, 9, 0]\n")
+    (home.folder / "state/picture.bin").unlink()
+    files = home.files()
+    for words in (("--force",), ("--force", "--init")):
+        done = home.run("restore", str(tmp_path / "all.zip"), *words)
+        assert done.returncode == 2
+        assert "expected an empty one, got rows in item" in done.stderr
+        assert home.files() == files
+    told = done.stderr.partition("any more: sudo ")[2].strip()
+    if database.kind == "sqlite":
+        subprocess.run(["sh", "-c", told], check=True, timeout=60)
+    else:
+        assert told == (
+            "mariadb -e 'DROP DATABASE IF EXISTS bus; DROP DATABASE IF EXISTS OpenHAB', and then restore with --init"
+        )
+        wipe(home, request, tmp_path)
+    done = home.run("restore", str(tmp_path / "all.zip"), "--force")
+    assert done.returncode == 0, done.stderr
+    assert "Küche" in (home.folder / "config/ip1/preset_position.yaml").read_text()
+    assert rows(database.address)["camera_order"]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="nobody else may give files away")
+def test_the_services_may_write_what_root_puts_back_on_another_machine(tmp_path: Path) -> None:
+    group = 12345
+    home = Home(tmp_path / "home", fresh_sqlite(tmp_path))
+    for name in ("cameras/ip1/learnt.json", "snapshots/ip1/1.jpg", "persistence/aside/1.json"):
+        (home.folder / "state" / name).parent.mkdir(parents=True)
+        (home.folder / "state" / name).write_text("{}")
+    assert home.run("backup", str(tmp_path / "all.zip")).returncode == 0
+    state = home.folder / "state"
+    shutil.rmtree(state)
+    state.mkdir()
+    os.chown(state, 0, group)
+    state.chmod(0o2770)  # as the installation makes it
+    home.database.address.path.unlink()
+    done = home.run("restore", str(tmp_path / "all.zip"))
+    assert done.returncode == 0, done.stderr
+    put_back = list(state.rglob("*"))
+    assert len(put_back) > 8
+    for path in put_back:
+        mode = path.stat().st_mode & 0o7777
+        assert (mode, path.stat().st_gid) == (0o2770 if path.is_dir() else 0o660, group), path
+
+
 @pytest.mark.mariadb
 def test_what_was_in_mariadb_can_go_on_in_a_file(tmp_path: Path, request: pytest.FixtureRequest) -> None:
     from tests.databases import fresh_mariadb
@@ -179,6 +230,35 @@ def test_who_a_service_is_to_the_broker_is_not_in_a_backup(tmp_path: Path) -> No
         names = archive.namelist()
     assert names
     assert not [name for name in names if name.endswith("/client")]
+
+
+def test_no_password_and_no_key_of_an_installation_is_in_a_backup(tmp_path: Path) -> None:
+    words = ["install", "--systemd", "--root", str(tmp_path), "--config", str(ROOT / "config/apartment.yaml")]
+    subprocess.run([sys.executable, "-m", "services", *words], check=True, capture_output=True, timeout=120)
+    made = tmp_path / "etc/apartment"
+    values = {file.read_text() for file in (made / "secrets/credentials").iterdir()}
+    values |= {file.read_text() for file in made.rglob("*.*") if file.suffix in (".key", ".crt")}
+    assert len(values) > 12
+    environment = {"APARTMENT_SECRETS": str(made / "secrets/secrets.yaml")}
+    apartment = load(made / "apartment.yaml", ("persistence",), environment)
+    list(backup.save(tmp_path / "all.zip", apartment, None))
+    with zipfile.ZipFile(tmp_path / "all.zip") as archive:
+        texts = {name: archive.read(name).decode(errors="replace") for name in archive.namelist()}
+    assert "config/apartment.yaml" in texts
+    assert "config/ip1/preset_position.yaml" in texts
+    assert not [name for name, text in texts.items() if any(value in text for value in values)]
+
+
+@pytest.mark.parametrize(
+    "name", ["ca.crt", "dashboard.key", "database/server.key", "broker/passwords", "secrets/secrets.yaml"]
+)
+def test_a_key_in_an_older_backup_is_not_put_over_that_of_this_machine(tmp_path: Path, name: str) -> None:
+    file, mine = forged(tmp_path, f"config/{name}", "of the old machine"), tmp_path / "home" / name
+    mine.parent.mkdir(parents=True)
+    mine.write_text("of this machine")
+    list(backup.put_files_back(file, backup.CONFIG, tmp_path / "home"))
+    list(backup.put_files_back(file, backup.CONFIG, tmp_path / "home", force=True))
+    assert mine.read_text() == "of this machine"
 
 
 def forged(folder: Path, name: str, text: str) -> Path:

@@ -71,3 +71,15 @@ def test_what_root_writes_belongs_to_whom_it_belonged_or_to_whom_the_folder_does
     assert {
         path.stat().st_uid for path in (folder / "one", folder / "one" / "more", folder / "one" / "more" / "file")
     } == {somebody}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="nobody else may give files away")
+def test_what_root_makes_is_for_those_who_write_in_the_folder_and_for_nobody_else(tmp_path: Path) -> None:
+    tmp_path.chmod(0o2770)
+    write_whole(tmp_path / "one" / "more" / "file", "x")
+    for path in (tmp_path / "one", tmp_path / "one" / "more"):
+        assert path.stat().st_mode & 0o7777 == 0o2770
+    assert mode(tmp_path / "one" / "more" / "file") == 0o660
+    tmp_path.chmod(0o1777)
+    write_whole(tmp_path / "two" / "file", "x")
+    assert (mode(tmp_path / "two"), mode(tmp_path / "two" / "file")) == (0o775, 0o664)

@@ -5,13 +5,16 @@ Not here: the work itself, `services/backup.py`.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from services.command_line.options import CONFIG, Config, out
 from services.config import Apartment, load
+from services.errors import ConfigError
 
 if TYPE_CHECKING:  # the databases' libraries, for these commands alone
     from services.storage import Address
@@ -39,6 +42,7 @@ def restore(
     from services.command_line import stored
 
     told = work.manifest(file)
+    _expect_room(file, config.with_name(told["config"]), init=init)
     for line in work.put_files_back(file, work.CONFIG, config.parent, force=force):
         out.print(line, markup=False)
     apartment = load(config.with_name(told["config"]), ("persistence",))
@@ -49,6 +53,26 @@ def restore(
             stored.init(config=apartment.file)
         for line in work.put_rows_back(file, database):
             out.print(line, markup=False)
+
+
+def _expect_room(file: Path, config: Path, *, init: bool) -> None:
+    """Before anything is written: ConfigError when the database that the backup's configuration names has rows.
+
+    A fault of that configuration is told later, with its place in the files that are written then.
+    """
+    from services import backup as work
+
+    with TemporaryDirectory() as name:
+        try:
+            list(work.put_files_back(file, work.CONFIG, Path(name)))
+            database = _database(load(Path(name) / config.name, ("persistence",)))
+        except ConfigError:
+            return
+    if database is None:
+        return
+    if database.path.is_relative_to(name):
+        database = replace(database, path=config.parent / database.path.relative_to(name))
+    work.expect_empty(database, made_later=init)
 
 
 def _database(apartment: Apartment) -> Address | None:

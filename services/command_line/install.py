@@ -44,19 +44,21 @@ def install(
     if compose_file is not None:
         document.write(compose_file, compose.compose(layout.parts(apartment), config.name))
         return
-    plan = [] if there.is_file() else list(steps.copied(config.parent))
+    plan = [] if there.is_file() else list(steps.copied(config.parent, root))
     plan += steps.files(apartment, Path(sys.executable))
     plan += list(steps.gone(plan, root))
     plan += [steps.ACCOUNTS]
+    after = [*steps.handed_out(root), *steps.commands()]
     if systemd:
         for step in plan:
             steps.do(step, root)
-        for told in steps.secrets(there, [*(host or []), *own_hosts()], root):
-            steps.do(told, root) if isinstance(told, steps.Step) else out.print(told, markup=False)
-        plan += steps.commands()
-        for step in steps.commands():
+        for told in steps.fill_secrets(there, [*(host or []), *own_hosts()], root):
+            out.print(told, markup=False)
+        for step in after:
             steps.do(step, root)
-    for step in plan if systemd else [*plan, *steps.commands()]:
+    else:
+        plan += steps.filled(file, root)
+    for step in [*plan, *after]:
         out.print(str(step), markup=False)
     for line in steps.next_words():
         out.print(line, markup=False)

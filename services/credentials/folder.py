@@ -112,6 +112,16 @@ def _home(config: Path, value: Any) -> Home:
     return home
 
 
+def files_of(folder: Folder, config: Path) -> Iterator[Path]:
+    """The files that `fill` sees to, for who only looks: all but the passwords that people bring."""
+    ours, _ = passwords.names(config)
+    yield folder.path / "secrets.yaml"
+    yield from (folder.path / "credentials" / name for name in ours)
+    for name in (AUTHORITY, *SERVERS):
+        yield from folder._files(name)
+    yield from (folder.path / "broker" / name for name in ("passwords", "acl", "mosquitto.conf"))
+
+
 def _fill_passwords(folder: Folder, config: Path, *, force: bool) -> Iterator[str]:
     known = folder.secrets()
     ours, peoples = passwords.names(config)

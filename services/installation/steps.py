@@ -16,7 +16,7 @@ from pathlib import Path
 
 from services import access
 from services.config import Apartment
-from services.credentials.folder import Folder, fill
+from services.credentials.folder import Folder, files_of, fill
 from services.errors import ApartmentError, ConfigError
 from services.installation import units
 from services.installation.layout import BROKER, DATABASE, GROUP, STATE, SYSTEM, TARGET, UNITS, parts
@@ -33,28 +33,32 @@ class NotDone(ApartmentError):
 
 @dataclass(frozen=True)
 class Step:
-    """A file to write (or to remove), or a command to run. `owner` where it is not root's."""
+    """A file to write (or to remove), or a command to run. `owner` where it is not root's; `source`: it is a copy."""
 
     path: Path | None = None
     text: str | bytes = field(default="", repr=False)
+    source: Path | None = None  # read when the step is done, for what a step before makes
     mode: int = 0o644
     owner: str = ""
     command: tuple[str, ...] = ()
     removed: bool = False
+    once: bool = False  # made where it is missing
 
     def __str__(self) -> str:
         if self.path is None:
             return f"run    {' '.join(self.command)}"
         if self.removed:
             return f"remove {self.path}"
-        return f"write  {self.path}{f' for {self.owner}' if self.owner else ''} ({self.mode:04o})"
+        told = f"{self.path}{f' for {self.owner}' if self.owner else ''} ({self.mode:04o})"
+        return f"make   {told} where it is missing" if self.once else f"write  {told}"
 
 
-def copied(source: Path) -> Iterator[Step]:
-    """The configuration's own files, for a machine that has none."""
+def copied(source: Path, root: Path) -> Iterator[Step]:
+    """The configuration's own files, as far as the machine has none of that name."""
     for file in sorted(source.rglob("*")):
-        if file.is_file():
-            yield Step(SYSTEM / file.relative_to(source), file.read_bytes())
+        path = SYSTEM / file.relative_to(source)
+        if file.is_file() and not (root / path.relative_to("/")).exists():
+            yield Step(path, source=file)
 
 
 def files(apartment: Apartment, python: Path) -> list[Step]:
@@ -98,26 +102,36 @@ def commands() -> list[Step]:
     return [Step(command=command) for command in wanted]
 
 
-def secrets(config: Path, hosts: Sequence[str], root: Path) -> Iterator[Step | str]:
-    """Passwords and certificates where there are none; then the broker's part of them, for its own user."""
-    folder = Folder(root / SECRETS.relative_to("/"))
-    yield from fill(folder, config, hosts, datetime.now(UTC))
+def filled(config: Path, root: Path) -> Iterator[Step]:
+    """The files with passwords and certificates, to be shown; `fill_secrets` makes them, what follows from them."""
+    for path in files_of(_secrets(root), config):
+        follows = path.parent.name == "broker" and path.stem != "server"
+        yield Step(Path("/") / path.relative_to(root), mode=0o600, once=not follows)
+
+
+def fill_secrets(config: Path, hosts: Sequence[str], root: Path) -> Iterator[str]:
+    """Passwords and certificates where there are none; a line for each thing done."""
+    yield from fill(_secrets(root), config, hosts, datetime.now(UTC))
+
+
+def handed_out(root: Path) -> Iterator[Step]:
+    """What others than root need of them: a copy for the broker, the database, the dashboard and everybody."""
+    folder = _secrets(root).path
     for name in BROKER_FILES:
-        text = (folder.path / "broker" / name).read_text(encoding="utf-8")
-        yield Step(BROKER / name, text, 0o600, "mosquitto")
-    yield Step(BROKER / "mosquitto.conf", access.broker_conf(BROKER, Path("/var/lib/mosquitto")), 0o600, "mosquitto")
+        yield Step(BROKER / name, mode=0o600, owner="mosquitto", source=folder / "broker" / name)
+    started_with = access.broker_conf(BROKER, Path("/var/lib/mosquitto"))
+    yield Step(BROKER / "mosquitto.conf", started_with, mode=0o600, owner="mosquitto")
     if root != Path("/") or _is_user("mysql"):
-        yield from _database(folder)
-    yield Step(SYSTEM / "ca.crt", folder.authority.read_text(encoding="ascii"))
-    if (dashboard := folder.pair("dashboard")) is not None:
-        yield Step(SYSTEM / "dashboard.crt", dashboard.certificate)
-        yield Step(SYSTEM / "dashboard.key", dashboard.key, 0o640, f":{GROUP}")
+        for name in ("server.crt", "server.key"):
+            yield Step(DATABASE / name, mode=0o600, owner="mysql", source=folder / "database" / name)
+        yield Step(Path("/etc/mysql/mariadb.conf.d/60-apartment.cnf"), units.database())
+    yield Step(SYSTEM / "ca.crt", source=_secrets(root).authority)
+    yield Step(SYSTEM / "dashboard.crt", source=folder / "dashboard" / "server.crt")
+    yield Step(SYSTEM / "dashboard.key", mode=0o640, owner=f":{GROUP}", source=folder / "dashboard" / "server.key")
 
 
-def _database(folder: Folder) -> Iterator[Step]:
-    for name in ("server.crt", "server.key"):
-        yield Step(DATABASE / name, (folder.path / "database" / name).read_text(encoding="ascii"), 0o600, "mysql")
-    yield Step(Path("/etc/mysql/mariadb.conf.d/60-apartment.cnf"), units.database())
+def _secrets(root: Path) -> Folder:
+    return Folder(root / SECRETS.relative_to("/"))
 
 
 def _is_user(name: str) -> bool:
@@ -137,7 +151,7 @@ def do(step: Step, root: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     if step.path.parent in (BROKER, DATABASE):
         file.parent.chmod(0o700)
-    write_private(file, step.text)
+    write_private(file, step.text if step.source is None else step.source.read_bytes())
     if step.owner and root == Path("/") and os.geteuid() == 0:
         user, _, group = step.owner.partition(":")
         if user and not _is_user(user):

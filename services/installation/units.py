@@ -181,8 +181,13 @@ def users(parts: Iterable[Part]) -> str:
 
 
 def folders(parts: Iterable[Part]) -> str:
-    """tmpfiles.d: what the services share; a new file there belongs to the group."""
-    lines = [f"d {STATE} 2770 root {GROUP} -"]
+    """tmpfiles.d: what the services share, where a new file belongs to the group; and what each has for itself.
+
+    The latter is for the user of its process, who is another one where services come to share a process or leave it.
+    """
+    parts = list(parts)
+    lines = [f"d {STATE} 2770 root {GROUP} -", f"z {STATE}/* ~2770 - {GROUP} -"]  # a database of SQLite is there too
+    lines += [f"Z {STATE}/{one.name} - {part.user} {GROUP} -" for part in parts for one in part.services]
     for place in dict.fromkeys(path for part in parts for path in written(part)):
         lines += [f"d {place} 2770 root {GROUP} -", f"Z {place} ~2770 root {GROUP} -"]
     return "\n".join(lines) + "\n"

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from services.errors import ConfigError
 from services.storage import Storage
 from services.storage.reading import DIALECTS
 
@@ -61,6 +60,7 @@ TABLES = (
     ),
     Table("diagnostic", ("component", "time", "level", "message", "details"), ("component", "time"), ("time",)),
 )  # fmt: skip
+NAMES = {"mysql": "SHOW TABLES", "sqlite": "SELECT name FROM sqlite_master"}  # of the tables that there are
 BY_NAME = {table.name: table for table in TABLES}
 
 
@@ -88,11 +88,15 @@ def _after(keys: list[tuple[str, str]]) -> str:
     return f"({name}>={value} AND ({name}>{value} OR {_after(more)}))" if more else f"{name}>{value}"
 
 
+def occupied(storage: Storage) -> str | None:
+    """A table that has rows; None where there are none, or no tables yet. For who opened it by `open_plain`, too."""
+    there = {str(row[0]) for row in storage.read(NAMES[storage.dialect])}
+    named = (table.name for table in TABLES if table.name in there)
+    return next((name for name in named if storage.read(f"SELECT 1 FROM {name} LIMIT 1")), None)
+
+
 def put_back(storage: Storage, source: Iterable[str]) -> dict[str, int]:
-    """Writes the rows of such lines into an empty database (ConfigError when it is not); how many of each table."""
-    for table in TABLES:
-        if storage.read(f"SELECT 1 FROM {table.name} LIMIT 1"):
-            raise ConfigError([f"the database: expected an empty one, got rows in {table.name}"])
+    """Writes the rows of such lines into a database that has none; how many of each table."""
     counted: dict[str, int] = {}
     waiting: list[str] = []
     now, length = TABLES[0], 0

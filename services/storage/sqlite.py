@@ -15,6 +15,7 @@ from typing import Any
 from services.errors import BadMessage, ConfigError, Unavailable
 from services.storage import FINAL_STATES, TABLES, Address, Batch, Diagnostic, Item, Sample, SeenTurn, Sighting
 from services.storage.migrate import migrate
+from services.storage.sqlite_file import make_ready
 from services.storage.sqlite_log import Log
 
 BUSY_S = 5.0
@@ -72,10 +73,7 @@ def _translated(*, opening: bool = False) -> Iterator[None]:
 
 def open_address(address: Address) -> SqliteStorage:
     """Opens or makes the file and brings the tables up to date; see `Storage` and `open_storage`."""
-    try:
-        address.path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError([f"the database's folder cannot be made: {error}"]) from error
+    make_ready(address.path)
     with _translated(opening=True):
         storage = SqliteStorage(address)
         try:

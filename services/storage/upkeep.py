@@ -14,6 +14,7 @@ from pathlib import Path
 from services.errors import ConfigError
 from services.storage import Address, Storage, open_plain, open_storage
 from services.storage.migrate import back, versions
+from services.storage.sqlite_file import look_at_rights
 
 RIGHTS = "SELECT, INSERT, UPDATE, DELETE, CREATE, ALTER, DROP, INDEX"
 READING = {"": "SELECT"}  # by table; "": all of them
@@ -109,6 +110,7 @@ def look(address: Address) -> Iterator[tuple[bool, str]]:
 
 
 def _look_at_file(storage: Storage) -> Iterator[tuple[bool, str]]:
+    yield look_at_rights(Path(storage.read("PRAGMA database_list")[0][2]))
     ((told,),) = storage.read("PRAGMA quick_check(1)")
     yield told == "ok", f"the file: {told}"
     ((mode,),) = storage.read("PRAGMA journal_mode")

@@ -115,6 +115,22 @@ def test_installing_again_keeps_what_people_changed(machine: Path) -> None:
     assert len(units(machine)) == 8
 
 
+@pytest.mark.parametrize("named", ["apartment.yaml", "simulated.yaml"])
+def test_files_of_peoples_own_stay_also_where_the_main_file_is_missing(tmp_path: Path, named: str) -> None:
+    assert install("--systemd", "--root", str(tmp_path)).returncode == 0
+    folder = tmp_path / "etc/apartment"
+    (folder / "home.yaml").write_text((folder / "home.yaml").read_text() + "# mine\n")
+    (folder / "ip1/preset_position.yaml").write_text("Mine: [1, 2, 0]\n")
+    (folder / named).unlink()
+    (folder / "bridge.yaml").unlink()
+    done = install("--systemd", "--root", str(tmp_path), "--config", str(ROOT / "config" / named))
+    assert done.returncode == 0, done.stderr
+    assert (folder / "home.yaml").read_text().endswith("# mine\n")
+    assert (folder / "ip1/preset_position.yaml").read_text() == "Mine: [1, 2, 0]\n"
+    for name in (named, "bridge.yaml"):
+        assert (folder / name).read_bytes() == (ROOT / "config" / name).read_bytes()
+
+
 def test_a_service_that_the_configuration_has_no_more_loses_its_unit(tmp_path: Path) -> None:
     assert install("--systemd", "--root", str(tmp_path)).returncode == 0
     config = tmp_path / "etc/apartment/apartment.yaml"
@@ -134,3 +150,7 @@ def test_a_dry_run_shows_the_steps_and_does_nothing(tmp_path: Path) -> None:
     assert "run    systemctl daemon-reload" in done.stdout
     assert list(tmp_path.iterdir()) == []
     assert install("--root", str(tmp_path)).returncode == 2
+    shown = set(re.findall(r"^(?:write|make ) +(/\S+)", done.stdout, re.M))
+    assert install("--systemd", "--root", str(tmp_path)).returncode == 0
+    made = {f"/{path.relative_to(tmp_path)}" for path in tmp_path.rglob("*") if path.is_file()}
+    assert shown == made, "every file"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
+from services.whole_file import write_whole
+
 log = logging.getLogger(__name__)
 
 
@@ -32,7 +34,6 @@ class Kept:
             return
         self._known = goal
         try:
-            self._file.parent.mkdir(parents=True, exist_ok=True)
-            self._file.write_text(goal or "", encoding="utf-8")
+            write_whole(self._file, goal or "")
         except OSError as error:  # then a restart is told of by the robot's own status alone
             log.warning("%s: %s", self._file, error)

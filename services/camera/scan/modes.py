@@ -16,6 +16,7 @@ from services.camera.device import Away, GetPicture, Mode, Picture, Refused, Rep
 from services.camera.errands import GetContrast, SetContrast
 from services.camera.looks import SCAN_CONTRAST
 from services.camera.plan import Plan, ask, attempt
+from services.whole_file import write_whole
 
 log = logging.getLogger(__name__)
 
@@ -88,8 +89,7 @@ class Modes:
         self.changed = True
         if self.file is not None and self.noted is not None:
             try:
-                self.file.parent.mkdir(parents=True, exist_ok=True)
-                self.file.write_text(json.dumps(asdict(self.noted)), encoding="utf-8")
+                write_whole(self.file, json.dumps(asdict(self.noted)))
             except OSError as error:
                 log.warning("how the picture was is not kept: %s", error)
 

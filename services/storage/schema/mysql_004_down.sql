@@ -1,5 +1,6 @@
 -- Back to version 3, MariaDB and MySQL. Of orders and missions with the same id the newest is kept.
-DROP TABLE IF EXISTS camera_order_3;
+-- It may end anywhere and begin again: at each moment the table of the real name is there, and has all rows.
+DROP TABLE IF EXISTS camera_order_3, camera_order_4;
 
 CREATE TABLE camera_order_3 (
   order_id VARCHAR(64) NOT NULL PRIMARY KEY, camera VARCHAR(64) NOT NULL, name VARCHAR(20) NOT NULL,
@@ -8,11 +9,11 @@ CREATE TABLE camera_order_3 (
 REPLACE INTO camera_order_3 (order_id, camera, name, value, state, error, at)
   SELECT order_id, camera, name, value, state, error, at FROM camera_order ORDER BY at;
 
-DROP TABLE camera_order;
+RENAME TABLE camera_order TO camera_order_4, camera_order_3 TO camera_order;
 
-RENAME TABLE camera_order_3 TO camera_order;
+DROP TABLE camera_order_4;
 
-DROP TABLE IF EXISTS mission_3;
+DROP TABLE IF EXISTS mission_3, mission_4;
 
 CREATE TABLE mission_3 (
   mission VARCHAR(64) NOT NULL PRIMARY KEY, robot VARCHAR(64) NOT NULL, marker INT NOT NULL,
@@ -24,6 +25,6 @@ REPLACE INTO mission_3 (mission, robot, marker, state, reason, place, x, y, z, s
   SELECT mission, robot, marker, state, reason, place, x, y, z, seen_by, started, ended, story FROM mission
   ORDER BY started;
 
-DROP TABLE mission;
+RENAME TABLE mission TO mission_4, mission_3 TO mission;
 
-RENAME TABLE mission_3 TO mission;
+DROP TABLE mission_4;

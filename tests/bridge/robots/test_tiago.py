@@ -308,3 +308,16 @@ def test_the_bridge_hears_of_the_lost_bus_for_its_robots(robot: Robot) -> None:
     robot.says("goto", x=0.0, y=0.0, id="g")
     assert list(service.handle(Message(LOST_TOPIC), NOW)) == []
     assert robot.part.goals.under_way is None
+
+
+def test_the_goal_that_is_kept_is_whole_at_every_moment(tmp_path: Path) -> None:
+    """Whoever has begun to read it reads on in the old one: it is replaced, and not written over."""
+    file = tmp_path / "robots" / "tiago"
+    kept = Kept(file)
+    kept.write("the first")
+    with file.open() as reader:
+        kept.write("another")
+        assert reader.read() == "the first"
+    assert Kept(file).read() == "another"
+    kept.write(None)
+    assert Kept(file).read() is None

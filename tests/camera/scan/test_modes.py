@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -112,3 +113,16 @@ def test_a_camera_that_goes_away_meanwhile_is_still_to_be_restored(at: type[Requ
     firmware.run(modes.leave())
     assert (firmware.picture, firmware.contrast) == BEFORE
     assert not modes.changed
+
+
+def test_the_note_is_whole_at_every_moment(tmp_path: Path) -> None:
+    """Whoever has begun to read it reads on in the old one: it is replaced, and not written over."""
+    file = tmp_path / "cameras" / "ip1-picture.json"
+    Firmware().run(Modes(file).enter())
+    before = f" {file.read_text()}"
+    file.write_text(before)
+    with file.open() as reader:
+        modes = Modes(file)
+        Firmware().run(modes.enter())
+        assert file.read_text() == before.strip()
+        assert reader.read() == before
