@@ -6,13 +6,15 @@ Accounts are made on MariaDB and MySQL alone; a SQLite file has none.
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 from services.errors import ConfigError
-from services.storage import Address, Storage, open_plain, open_storage
+from services.storage import Address, Storage, ahead, open_plain, open_storage
 from services.storage.migrate import back, versions
 
 RIGHTS = "SELECT, INSERT, UPDATE, DELETE, CREATE, ALTER, DROP, INDEX"
@@ -105,7 +107,14 @@ def look(address: Address) -> Iterator[tuple[bool, str]]:
     with closing(open_storage(address)) as storage:
         yield True, f"schema version {version(storage)}, the newest"
         yield True, f"{len(storage.items)} items"
+        yield _look_at_times(storage, time.time())
         yield from _look_at_server(storage) if storage.dialect == "mysql" else _look_at_file(storage)
+
+
+def _look_at_times(storage: Storage, now: float) -> tuple[bool, str]:
+    _, odd = ahead.last_values(storage, now)
+    told = ", ".join(f"{one.item} ({datetime.fromtimestamp(one.time / 1e6, UTC):%Y-%m-%dT%H:%M:%SZ})" for one in odd)
+    return not odd, f"rows whose time has not come, which nobody goes by: {told or 'none'}"
 
 
 def _look_at_file(storage: Storage) -> Iterator[tuple[bool, str]]:
