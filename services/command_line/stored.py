@@ -101,7 +101,7 @@ def _missions(found: list[dict[str, object]], zone: tzinfo, *, json: bool, as_cs
 def init(admin: Admin = "root", config: Config = CONFIG) -> None:
     """Make the databases, the accounts of writer, reader and keeper, and the tables; what is there stays.
 
-    A SQLite file is just made.
+    The accounts get the passwords of the configuration, new ones too. A SQLite file is just made.
     """
     from services.storage import open_storage, upkeep
 

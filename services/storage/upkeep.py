@@ -39,14 +39,13 @@ def administrator(address: Address, user: str, password: str | None) -> Address:
 
 
 def make_databases(address: Address, admin: Address) -> None:
-    """Both databases in UTF-8 and the writer's account; what is there stays. Its password is that of `address`."""
+    """Both databases in UTF-8 and the writer's account, with the password of `address`; what else is there stays."""
     with closing(open_plain(admin)) as server:
         account = _account(server, address)
-        secret = server.quote(address.password or "")
         for name in (address.database, address.view_database):
             server.change(f"CREATE DATABASE IF NOT EXISTS `{name}` CHARACTER SET utf8mb4")
         server.change(
-            f"CREATE USER IF NOT EXISTS {account} IDENTIFIED BY {secret}",
+            *_with_password(server, account, address.password),
             f"GRANT {RIGHTS} ON `{address.database}`.* TO {account}",
             f"GRANT {VIEW_RIGHTS} ON `{address.view_database}`.* TO {account}",
         )
@@ -56,7 +55,7 @@ def make_account(address: Address, admin: Address, rights: Mapping[str, str]) ->
     """An account of a service's own, by what it may do to which table, and nothing else. The tables are there."""
     with closing(open_plain(admin)) as server:
         account = _account(server, address)
-        server.change(f"CREATE USER IF NOT EXISTS {account} IDENTIFIED BY {server.quote(address.password or '')}")
+        server.change(*_with_password(server, account, address.password))
         for table, what in rights.items():
             server.change(f"GRANT {what} ON `{address.database}`.{f'`{table}`' if table else '*'} TO {account}")
 
@@ -67,10 +66,18 @@ def let_read(address: Address, admin: Address, reader: str, password: str, host:
         account = f"{server.quote(_checked(ACCOUNT, reader))}@{server.quote(_checked(HOST, host))}"
         encrypted = "NONE" if host in LOCAL else "SSL"
         server.change(
-            f"CREATE USER IF NOT EXISTS {account} IDENTIFIED BY {server.quote(password)}",
-            f"ALTER USER {account} IDENTIFIED BY {server.quote(password)} REQUIRE {encrypted}",
+            *_with_password(server, account, password),
+            f"ALTER USER {account} REQUIRE {encrypted}",
             f"GRANT SELECT ON `{address.view_database}`.* TO {account}",
         )
+
+
+def _with_password(server: Storage, account: str, password: str | None) -> Iterator[str]:
+    """An account, made or there already, that comes by this password from now on; without one it stays as it is."""
+    secret = server.quote(password or "")
+    yield f"CREATE USER IF NOT EXISTS {account} IDENTIFIED BY {secret}"
+    if password is not None:
+        yield f"ALTER USER {account} IDENTIFIED BY {secret}"
 
 
 def _account(server: Storage, address: Address) -> str:

@@ -334,6 +334,43 @@ class TestAccounts:
                                   "USER IF EXISTS grafana@`192.0.2.%`"):  # fmt: skip
                     root.query(f"DROP {statement}")
 
+    def test_new_passwords_of_the_configuration_are_given_to_the_accounts(
+        self, mariadb_server: mariadb.Server, tmp_path: Path
+    ) -> None:
+        """As after `apartment secrets init --force`."""
+        server, where = mariadb_server, f"localhost/forced?socket={mariadb_server.socket}"
+        config = configured(tmp_path, f"mysql://w@{where}", "old_w")
+        config.write_text(
+            config.read_text().replace("persistence: {", "persistence: {view_database: ForcedViews, ")
+            + f"history: {{url: 'mysql://r@{where}', password: old_r, keeper: {{user: k, password: old_k}}}}\n"
+        )
+        try:
+            run(config, "init", "--admin", server.admin)
+            config.write_text(config.read_text().replace("old_", "new_"))
+            run(config, "init", "--admin", server.admin)
+            for user in "wrk":
+                with connected(server, user, f"new_{user}", "forced"):
+                    pass
+                with pytest.raises(pymysql.err.OperationalError, match="1045"):
+                    connected(server, user, f"old_{user}", "forced")
+        finally:
+            with connected(server, server.admin, "", None) as root:
+                for what in ("DATABASE IF EXISTS forced", "DATABASE IF EXISTS ForcedViews",
+                             "USER IF EXISTS w@localhost, r@localhost, k@localhost"):  # fmt: skip
+                    root.query(f"DROP {what}")
+
+    def test_an_account_that_needs_no_password_goes_on_without_one(self, mariadb_server: mariadb.Server) -> None:
+        server = mariadb_server
+        writer = read_address(f"mysql://by_socket@localhost/{server.database}?socket={server.socket}")
+        with connected(server, server.admin, "", None) as root, root.cursor() as cursor:
+            cursor.execute("CREATE USER by_socket@localhost IDENTIFIED VIA unix_socket")
+            try:
+                upkeep.make_databases(writer, upkeep.administrator(writer, server.admin, None))
+                cursor.execute("SHOW CREATE USER by_socket@localhost")
+                assert "VIA unix_socket" in cursor.fetchone()[0]
+            finally:
+                cursor.execute("DROP USER by_socket@localhost")
+
     def test_a_name_that_is_no_name_is_refused(self, mariadb_server: mariadb.Server) -> None:
         database: MariaDb = fresh_mariadb(mariadb_server)
         admin = upkeep.administrator(database.address, mariadb_server.admin, None)
