@@ -7,19 +7,21 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from services.errors import ConfigError
-from services.storage import Address, Storage, ahead, open_plain, open_storage
+from services.storage import Address, Storage, ahead, migrate, open_plain, open_storage, reading, schema_version
 from services.storage.migrate import back, versions
 
 RIGHTS = "SELECT, INSERT, UPDATE, DELETE, CREATE, ALTER, DROP, INDEX"
 READING = {"": "SELECT"}  # by table; "": all of them
 KEEPING = {"": "SELECT", "sample": "DELETE", "summary": "INSERT, UPDATE, DELETE"}
+ASKS = ("SELECT 1 FROM item LIMIT 0", "SELECT 1 FROM sample LIMIT 0", "SELECT 1 FROM summary LIMIT 0")
+KEEPS = (*ASKS, "DELETE FROM sample WHERE 1=0", "DELETE FROM summary WHERE 1=0", "UPDATE summary SET n=n WHERE 1=0")
 VIEW_RIGHTS = "SELECT, CREATE VIEW, SHOW VIEW, DROP"
 ACCOUNT = re.compile(r"[A-Za-z0-9_-]{1,32}")
 HOST = re.compile(r"[A-Za-z0-9_.:%/-]{1,255}")
@@ -110,12 +112,32 @@ def take_back(address: Address, to: int) -> int:
 
 
 def look(address: Address) -> Iterator[tuple[bool, str]]:
-    """Whether each thing is well, and what it is. What cannot be used at all comes out as ConfigError."""
-    with closing(open_storage(address)) as storage:
-        yield True, f"schema version {version(storage)}, the newest"
-        yield True, f"{len(storage.items)} items"
-        yield _look_at_times(storage, time.time())
+    """Whether each thing is well, and what it is. What cannot be used at all comes out as ConfigError.
+
+    Nothing is made, and nothing brought up to date: that is the writer's.
+    """
+    if address.dialect == "sqlite" and not address.path.exists():
+        yield True, f"no file {address.path} yet: the first who writes makes it"
+        return
+    with closing(open_plain(address)) as storage:
+        found, newest = schema_version(storage), max(versions(address.dialect))
+        if found > newest:
+            raise migrate.too_new(found, newest)
+        yield True, f"schema version {found}, {'the newest' if found == newest else f'the writer makes it {newest}'}"
+        if found:
+            yield True, f"{len(reading.items(storage))} items"
+            yield _look_at_times(storage, time.time())
         yield from _look_at_server(storage) if storage.dialect == "mysql" else _look_at_file(storage)
+
+
+def tried(address: Address, statements: Iterable[str]) -> None:
+    """Does what changes nothing, of ASKS or KEEPS; ConfigError or Unavailable when this user may not."""
+    with closing(open_plain(address)) as storage:
+        for statement in statements:
+            if statement.startswith("SELECT"):
+                storage.read(statement)
+            else:
+                storage.change(statement)
 
 
 def _look_at_times(storage: Storage, now: float) -> tuple[bool, str]:
@@ -132,11 +154,14 @@ def _look_at_file(storage: Storage) -> Iterator[tuple[bool, str]]:
 
 
 def _look_at_server(storage: Storage) -> Iterator[tuple[bool, str]]:
-    ((server, flush, binlog, sync, mode, packet, zone),) = storage.read(
+    ((server, flush, binlog, sync, mode, packet, zone, charset, explicit),) = storage.read(
         "SELECT @@version, @@innodb_flush_log_at_trx_commit, @@log_bin, @@sync_binlog, @@sql_mode, "
-        "@@max_allowed_packet, CONVERT_TZ('2026-01-31 07:00:00', 'UTC', 'Europe/Madrid')"
+        "@@max_allowed_packet, CONVERT_TZ('2026-01-31 07:00:00', 'UTC', 'Europe/Madrid'), @@character_set_database, "
+        "@@explicit_defaults_for_timestamp"
     )
     yield True, f"server {server}"
+    yield charset == "utf8mb4", f"character set {charset} (utf8mb4)"
+    yield bool(int(explicit)), f"explicit_defaults_for_timestamp={explicit} (1: old rows keep their times)"
     yield int(flush) == 1, f"innodb_flush_log_at_trx_commit={flush} (1: a commit is on the disk before it is answered)"
     yield not int(binlog) or int(sync) == 1, f"binary log {'on' if int(binlog) else 'off'}, sync_binlog={sync}"
     yield "STRICT_TRANS_TABLES" in str(mode), f"sql_mode {mode}"
