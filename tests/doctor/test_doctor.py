@@ -320,3 +320,13 @@ def test_the_command_shows_the_mend_and_ends_with_one(patient: Patient) -> None:
     assert done.returncode == 1, done.stderr
     assert "mend: systemctl start mosquitto" in done.stdout
     assert not [one for one in patient.told["bus"]["accounts"].values() if one in done.stdout + done.stderr]
+
+
+def test_a_mend_by_a_command_of_ours_is_for_the_same_configuration(tmp_path: Path) -> None:
+    config = tmp_path / "apartment.yaml"
+    config.write_text("bus: {accounts: {operator: '${BUS_OPERATOR_PASSWORD}'}}\n")
+    command = [sys.executable, "-m", "services", "doctor", "--config", str(config)]
+    nothing = {**os.environ, "APARTMENT_SECRETS": str(tmp_path / "none.yaml")}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=ROOT, env=nothing, check=False)
+    assert "mend: apartment secrets init\n" in done.stdout, done.stderr
+    assert f"each `apartment ...` with --config {config}" in done.stdout
