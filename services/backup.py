@@ -30,6 +30,7 @@ LARGEST = 1 << 30  # bytes of one file that is put back; a small archive may cla
 
 def save(file: Path, apartment: Apartment, database: Address | None) -> Iterator[str]:
     """Writes the archive; whoever looks meanwhile sees no file, or the old one. Yields a line for each part."""
+    yield f"{apartment.file}: what this configuration says and names"
     with (
         whole_file(file, mode=PRIVATE) as output,
         zipfile.ZipFile(output, "w", zipfile.ZIP_DEFLATED, strict_timestamps=False) as archive,

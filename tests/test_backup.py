@@ -139,6 +139,7 @@ def test_backup_wipe_restore_gives_everything_back_as_it_was(
     assert all(before.values())
     saved = home.run("backup", str(tmp_path / "all.zip"))
     assert saved.returncode == 0, saved.stderr
+    assert f"{home.config}: what this configuration says and names" in saved.stdout
     assert (tmp_path / "all.zip").stat().st_mode & 0o777 == 0o600
     wipe(home, request, tmp_path)
     done = home.run("restore", str(tmp_path / "all.zip"))

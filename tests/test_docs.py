@@ -157,3 +157,26 @@ def test_the_commands_that_the_documentation_names_exist() -> None:
             assert first in root.commands, f"{page.name}: apartment {words}"
             inner = getattr(root.commands[first], "commands", None)
             assert inner is None or not more or more[0] in inner, f"{page.name}: apartment {words}"
+
+
+INSTALLED = ("raspberry-pi.md", "security.md", "troubleshooting.md")  # pages for who has /etc/apartment
+OWN = "install"  # it takes the configuration there by itself
+
+
+def test_commands_for_an_installation_name_its_configuration() -> None:
+    """In tables and blocks, from which they are copied: /opt/apartment has a configuration too, the example."""
+    root: Any = typer.main.get_command(app)
+    seen = 0
+    for page in INSTALLED:
+        text = (ROOT / "docs" / page).read_text("utf-8")
+        rows = "\n".join(line for line in text.splitlines() if line.startswith("|"))
+        blocks = "\n".join(re.findall(r"^```sh\n(.*?)^```", text, re.M | re.S))
+        for line in [*re.findall(r"`([^`]*)`", rows), *blocks.splitlines()]:
+            for words in re.findall(r"(?:^|[/ ])apartment ([a-z][^&;|#]*)", line):
+                command, *more = words.split()
+                made = getattr(root.commands[command], "commands", {}).get(more[0] if more else "")
+                (option,) = [one for one in (made or root.commands[command]).params if "--config" in one.opts]
+                if command != OWN and "does not read it" not in option.help:
+                    seen += 1
+                    assert "--config" in words, f"{page}: apartment {words}"
+    assert seen > 10

@@ -27,6 +27,8 @@ def doctor(
             out.print(f"{'well' if one.good else 'ILL '}  {one.part}: {one.what}", markup=False)
             if not one.good:
                 out.print(f"      mend: {one.mend}", markup=False)
+    if config != CONFIG and not json and any(" apartment " in f" {one.mend}" for one in findings):
+        out.print(f"      (each `apartment ...` with --config {config})", markup=False)
     if json:
         out.print_json(data=[asdict(one) for one in findings])
     if not all(one.good for one in findings):

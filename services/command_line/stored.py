@@ -102,7 +102,7 @@ def _missions(found: list[dict[str, object]], zone: tzinfo, *, json: bool, as_cs
 def init(admin: Admin = "root", config: Config = CONFIG) -> None:
     """Make the databases, the accounts of writer, reader and keeper, and the tables; what is there stays.
 
-    A SQLite file is just made.
+    The accounts get the passwords of the configuration, new ones too. A SQLite file is just made.
     """
     from services.storage import open_storage, upkeep
 
@@ -167,7 +167,8 @@ def check(config: Config = CONFIG, json: Json = False) -> None:
 def import_(source: str, config: Config = CONFIG, json: Json = False) -> None:
     """Copy an OpenHAB's own tables into ours: of the old MySQL binding, or of the JDBC service. It may run again.
 
-    Its password comes from OPENHAB_DATABASE_PASSWORD. Times without a zone are on the home's clock (`timezone`).
+    Its password comes from OPENHAB_DATABASE_PASSWORD. Times without a zone are on the home's clock (`timezone`). Rows
+    whose time has not come (forecasts) are left out.
     """
     from services.persistence import openhab_tables
     from services.storage import open_plain, open_storage
@@ -175,7 +176,7 @@ def import_(source: str, config: Config = CONFIG, json: Json = False) -> None:
     apartment = load(config, ("persistence",))
     with closing(open_plain(_other(source))) as there, closing(open_storage(_settings(apartment).address)) as ours:
         tallies = [
-            openhab_tables.copy(there, table, ours, apartment.home, apartment.home.zone)
+            openhab_tables.copy(there, table, ours, apartment.home, apartment.home.zone, time.time())
             for table in openhab_tables.find(there)
         ]
     _tell(tallies, json)
@@ -231,7 +232,8 @@ def _tell(tallies: list[Tally], json: bool) -> None:
         return
     for one in tallies:
         odd = f", {one.odd} kept as text" if one.odd else ""
-        _say(f"{one.table}  {one.item}  {one.read} rows{odd}")
+        future = f", {one.future} whose time has not come left out" if one.future else ""
+        _say(f"{one.table}  {one.item}  {one.read} rows{odd}{future}")
 
 
 def _question(

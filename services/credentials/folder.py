@@ -12,6 +12,7 @@ reading, `secret_store.py`.
 
 from __future__ import annotations
 
+import ipaddress
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -88,7 +89,10 @@ def _text(value: str) -> str:
 
 
 def fill(folder: Folder, config: Path, hosts: Sequence[str], now: datetime, *, force: bool = False) -> Iterator[str]:
-    """Makes what is missing (with `force` all, but not what people brought); yields a line for each thing done."""
+    """Makes what is missing (with `force` all, but not what people brought); yields a line for each thing done.
+
+    Certificates that lack one of `hosts` are made again for that one too, by the same authority; no name is ever lost.
+    """
     _outside_a_repository(folder.path)
     source = document.read(config)
     if source.value is None:
@@ -141,9 +145,20 @@ def _fill_certificates(folder: Folder, hosts: Sequence[str], now: datetime, *, f
         yield f"{folder.authority}: a new authority, until {certificates.ends(signer.certificate):%Y-%m-%d}"
         force = True  # what another authority has signed is of no use
     for name in SERVERS:
-        if force or folder.pair(name) is None:
-            folder.keep_pair(name, certificates.server(signer, name, hosts, now))
-            yield f"{folder.path / name}: a new certificate for {', '.join(hosts)}"
+        old = folder.pair(name)
+        known = certificates.hosts(old.certificate) if old is not None else []
+        wanted = list(dict.fromkeys([*known, *map(_plain, hosts)]))
+        if force or wanted != known:
+            folder.keep_pair(name, certificates.server(signer, name, wanted, now))
+            yield f"{folder.path / name}: a new certificate for {', '.join(wanted)}"
+
+
+def _plain(host: str) -> str:
+    """An address as certificates tell it, a name as it is."""
+    try:
+        return str(ipaddress.ip_address(host))
+    except ValueError:
+        return host
 
 
 def renew(folder: Folder, within: timedelta, now: datetime) -> Iterator[str]:

@@ -42,9 +42,7 @@ def look(settings: BusSettings) -> Iterator[Finding]:
         yield ill(PART, f"{where} speaks MQTT 3.1.1 only", "mosquitto 2: late orders are found out by MQTT 5 alone")
     refused = _refusal(replace(at, protocol=spoken))
     if refused:
-        mend = (
-            "apartment secrets init, then install its broker/passwords and reload mosquitto; or bus.accounts.operator"
-        )
+        mend = "apartment secrets init, then apartment install --systemd for the broker's own; or bus.accounts.operator"
         yield ill(PART, f"{where} refuses {ACCOUNT}: {refused}", mend)
         return
     yield well(PART, f"{where} lets {ACCOUNT} in")
@@ -54,7 +52,8 @@ def look(settings: BusSettings) -> Iterator[Finding]:
 def _unreachable(where: str, error: OSError) -> Finding:
     if isinstance(error, ssl.SSLError):
         mend = (
-            "bus.tls.ca: the ca.crt of the broker's machine; bus.host: a name in its certificate (secrets init --host)"
+            "bus.tls.ca: the ca.crt of the broker's machine; bus.host: a name in its certificate, or there "
+            "apartment install --systemd --host NAME"
         )
         return ill(PART, f"{where} shows a certificate that is not trusted: {error.reason or error}", mend)
     if isinstance(error, socket.gaierror):

@@ -51,9 +51,9 @@ def _modes(environment: Mapping[str, str]) -> Iterator[Finding]:
 
 
 def _state(folder: Path) -> Iterator[Finding]:
+    there = next(one for one in (folder.absolute(), *folder.absolute().parents) if one.exists())  # a service makes it
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        with tempfile.TemporaryFile(dir=there):
             pass
     except OSError as error:
         yield ill(
@@ -61,7 +61,7 @@ def _state(folder: Path) -> Iterator[Finding]:
         )
         return
     yield well(PART, f"{folder} can be written")
-    yield room(shutil.disk_usage(folder).free, folder)
+    yield room(shutil.disk_usage(there).free, folder)
 
 
 def room(free: int, folder: Path) -> Finding:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import urlsplit
 
+from services import history
 from services.camera.device import BadLogin, Locked
 from services.camera.probe import login
 from services.camera.probe.wire import Wire
@@ -33,6 +34,18 @@ def database(at: Address) -> Iterator[Finding]:
         yield ill("database", str(error), mend)
     except Unavailable as error:
         yield ill("database", f"{at}: {error}", "systemctl start mariadb; or `url` in the section persistence")
+
+
+def readers(config: history.Config) -> Iterator[Finding]:
+    """Whether the history service, who comes under other names than the writer, may do there what it has to."""
+    wanted = [(config.address, upkeep.ASKS), *([(config.keeping_address, upkeep.KEEPS)] if config.keep else [])]
+    for at, statements in wanted if config.address.dialect == "mysql" else ():
+        try:
+            upkeep.tried(at, statements)
+        except (ConfigError, Unavailable) as error:
+            yield ill("database", f"{at.user} cannot do the work of history: {error}", "apartment db init")
+        else:
+            yield well("database", f"{at.user} may do the work of history")
 
 
 def camera(name: str, config: Any) -> Iterator[Finding]:
@@ -62,16 +75,22 @@ def _log_in(wire: Wire, brand: str) -> None:
         wire.close()
 
 
-def ros(environment: Mapping[str, str] = os.environ) -> Iterator[Finding]:
-    """Whether the master answers, and names can be resolved in both directions; ROS nodes call each other by name."""
-    uri = environment.get("ROS_MASTER_URI", "http://localhost:11311")
+def ros(
+    environment: Mapping[str, str] = os.environ, master_uri: str | None = None, unit: str = "apartment-bridge.service"
+) -> Iterator[Finding]:
+    """Whether the master answers, and names can be resolved in both directions; ROS nodes call each other by name.
+
+    As the bridge sees it: `environment` is what it is started with, `master_uri` its setting, `unit` its unit.
+    """
+    uri = master_uri or environment.get("ROS_MASTER_URI", "http://localhost:11311")
     try:
         nodes = _nodes(uri)
     except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
-        yield ill("ros", f"no master at {uri}: {error}", "start roscore; or ROS_MASTER_URI=http://<robot>:11311")
+        mend = "start roscore; or bridge.master_uri: http://<robot>:11311 (without it its own ROS_MASTER_URI)"
+        yield ill("ros", f"no master at {uri}: {error}", mend)
         return
     yield well("ros", f"a master at {uri}")
-    yield _own_name(environment, urlsplit(uri).hostname or "localhost")
+    yield _own_name(environment, urlsplit(uri).hostname or "localhost", unit)
     for host in sorted({urlsplit(node).hostname or "" for node in nodes}):
         if _resolved(host) is None:
             yield ill("ros", f"a node calls itself {host}, which nobody here knows", f"a line for {host} in /etc/hosts")
@@ -97,15 +116,17 @@ def _nodes(uri: str) -> list[str]:
     return [str(answer[2]) for answer in answers if answer[0] == 1]
 
 
-def _own_name(environment: Mapping[str, str], master: str) -> Finding:
+def _own_name(environment: Mapping[str, str], master: str, unit: str) -> Finding:
+    address = "ROS_IP=<this machine's address>"
+    ours = f"systemctl edit {unit}: [Service] Environment={address} (outside of systemd: export {address})"
     name = environment.get("ROS_HOSTNAME") or environment.get("ROS_IP") or socket.gethostname()
     found, there = _resolved(name), _resolved(master)
     if found is None:
-        mend = "export ROS_IP=<this machine's address>, or a line in /etc/hosts here and on the robot"
+        mend = f"{ours}, or a line in /etc/hosts here and on the robot"
         return ill("ros", f"this machine calls itself {name}, which cannot be resolved", mend)
     if found.startswith(LOOPBACK) and there is not None and not there.startswith(LOOPBACK):
         told = f"this machine calls itself {name}, which is {found}: the robot would look for it in itself"
-        return ill("ros", told, "export ROS_IP=<this machine's address>")
+        return ill("ros", told, ours)
     return well("ros", f"this machine calls itself {name} ({found})")
 
 

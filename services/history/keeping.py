@@ -83,7 +83,7 @@ def _of_item(storage: Storage, item: Item, line: Keep, now: int) -> Iterator[int
         until = min(until, made[1] if made else closed)
         if oldest:
             yield keeping.forget(storage, item, width, oldest)
-    while cleared := keeping.clear(storage, item, until, PIECE):
+    while cleared := keeping.clear(storage, item, until, PIECE, now):
         yield cleared
 
 

@@ -26,7 +26,7 @@ from services.history.keeping import Keep
 from services.payloads.history import HistoryGet, HistoryReply
 from services.runner import Post
 from services.section import Section
-from services.storage import Storage, open_ready
+from services.storage import Storage, ahead, open_ready
 from services.storage.address import Address
 from services.storage.settings import DatabaseSection
 from services.topic import LEVELS
@@ -139,6 +139,8 @@ class History:
         self.due: float | None = 0.0 if self._lines else None
         self.counters: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self._asked, self._house = Opened(opener), Opened(keeper or opener)
+        self._ticked: float | None = None
+        self._doubted = False
 
     def handle(self, message: Message, now: float) -> Iterator[Message]:
         """Answers a question, in every case; one that makes no sense or comes late as far as its id can be read."""
@@ -173,6 +175,9 @@ class History:
 
     def tick(self, now: float) -> tuple[Message, ...]:
         """One piece of keeping house, when that is due."""
+        if self._lines and self._ticked is not None and now - self._ticked > ahead.FAR_S:
+            self._doubt("the clock was set on by days", now, ahead.FAR_S)
+        self._ticked = now
         if self.due is not None and now >= self.due:
             try:
                 self._keep_house(now)
@@ -187,12 +192,22 @@ class History:
             self.due = (self._house.since or now) + SETTLE_S
             return
         if self._round is None:
-            self._round = keeping.pieces(self._house.get(now), self._lines, now)
+            storage = self._house.get(now)
+            if ahead.is_alone(storage, now):
+                self._doubt("the clock is days ahead of all that is stored", now, ROUND_EVERY_S)
+                return
+            self._round, self._doubted = keeping.pieces(storage, self._lines, now), False
         rows = next(self._round, None)
         self.counters["pieces"] += rows is not None
         if rows is None:
             self._round = None
         self.due = now + (ROUND_EVERY_S if rows is None else PAUSE_S)
+
+    def _doubt(self, why: str, now: float, wait_s: float) -> None:
+        """What a wrong clock calls old would be gone for ever, so keeping house waits."""
+        if not self._doubted:
+            log.warning("%s: nothing is cleared away meanwhile", why)
+        self._round, self._doubted, self.due = None, True, now + wait_s
 
     def close(self) -> None:
         """Ends the connections."""

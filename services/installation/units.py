@@ -103,8 +103,9 @@ WantedBy=multi-user.target
 
 
 def renewal(python: Path, secrets: Path) -> dict[str, str]:
-    """Certificates are renewed long before they end; those who use them read them again."""
-    broker, page = BROKER / "server", SYSTEM / "dashboard"
+    """Certificates are renewed long before they end; who has a new one is told, and nobody else is disturbed."""
+    reload = "systemctl --no-block reload-or-restart mosquitto.service"
+    restart = "systemctl --no-block try-restart apartment-dashboard.service"
     return {
         "apartment-renew.service": f"""\
 [Unit]
@@ -113,14 +114,9 @@ Description=Smart apartment: certificates that end soon
 [Service]
 Type=oneshot
 ExecStart={python} -m services secrets renew --within 60 --out {secrets}
-ExecStart=/usr/bin/install -o mosquitto -m 0600 {secrets}/broker/server.key {broker}.key
-ExecStart=/usr/bin/install -o mosquitto -m 0600 {secrets}/broker/server.crt {broker}.crt
-ExecStart=-/usr/bin/install -o mysql -m 0600 {secrets}/database/server.key {DATABASE}/server.key
-ExecStart=-/usr/bin/install -o mysql -m 0600 {secrets}/database/server.crt {DATABASE}/server.crt
-ExecStart=/usr/bin/install -g {GROUP} -m 0640 {secrets}/dashboard/server.key {page}.key
-ExecStart=/usr/bin/install -m 0644 {secrets}/dashboard/server.crt {page}.crt
-ExecStart=-/usr/bin/systemctl --no-block reload-or-restart mosquitto.service
-ExecStart=-/usr/bin/systemctl --no-block try-restart apartment-dashboard.service
+ExecStart={_handed(secrets / "broker", BROKER / "server", "-o mosquitto -m 0600", reload)}
+ExecStart=-{_handed(secrets / "database", DATABASE / "server", "-o mysql -m 0600", 'mariadb -e "FLUSH SSL"')}
+ExecStart={_handed(secrets / "dashboard", SYSTEM / "dashboard", f"-g {GROUP} -m 0640", restart)}
 UMask=0077
 ReadWritePaths={secrets} {SYSTEM}
 CapabilityBoundingSet=CAP_CHOWN CAP_FOWNER CAP_DAC_OVERRIDE
@@ -141,6 +137,13 @@ Persistent=yes
 WantedBy=timers.target
 """,
     }
+
+
+def _handed(made: Path, used: Path, whose: str, then: str) -> str:
+    """A line that gives a new key and certificate to who uses them, and tells him; one that he has is left alone."""
+    key = f"install {whose} {made}/server.key {used}.key"
+    crt = f"install {whose.replace('0640', '0644')} {made}/server.crt {used}.crt"
+    return f"/bin/sh -c 'cmp -s {made}/server.crt {used}.crt || {{ {key} && {crt} && {{ {then} || true; }}; }}'"
 
 
 def broker() -> str:

@@ -54,6 +54,7 @@ class Tally:
     table: str
     read: int = 0
     odd: int = 0  # values that are no state of the item's type: kept as text
+    future: int = 0  # forecasts, whose time has not come: left out
 
 
 def find(source: Storage) -> list[Table]:
@@ -118,16 +119,19 @@ def copy(
     storage: Storage,
     home: Home,
     zone: tzinfo,
+    now: float,
     tell: Callable[[int], None] = lambda n: None,
 ) -> Tally:
-    """All rows of a table, in pieces; a row that is there already (from an import before) stays as it is."""
+    """A table's rows up to `now`, in pieces; a row that is there already (from an import before) stays as it is."""
     tally = Tally(table.item, table.name)
     item = _item(source, table, home)
     storage.add_items([item])
     for piece in _pieces(source, table):
         samples = [_sample(storage.items[item.name], when, value, table, zone, tally) for when, value in piece]
-        storage.write(Batch(samples))
+        past = [sample for sample in samples if sample.time <= now * US]
+        storage.write(Batch(past))
         tally.read += len(piece)
+        tally.future += len(samples) - len(past)
         tell(tally.read)
     return tally
 

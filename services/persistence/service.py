@@ -27,7 +27,7 @@ from services.persistence.seen import Seen
 from services.persistence.strategies import Restore, Rule, Timetable
 from services.persistence.writers import Writers
 from services.runner import Post
-from services.storage import Batch, Row, Storage, open_storage, reading
+from services.storage import Batch, Row, Storage, ahead, open_storage, reading
 from services.storage.settings import DatabaseSection
 
 log = logging.getLogger(__name__)
@@ -70,7 +70,6 @@ def start(config: Config, post: Post) -> Iterator[Persistence]:
     address = config.address
     service = Persistence(config, lambda: open_storage(address))
     service.connection.first()
-    service.prepare()
     try:
         yield service
     finally:
@@ -106,14 +105,6 @@ class Persistence:
         self._learnt = False
         self._connected = False  # once, in this life
 
-    def prepare(self) -> None:
-        """Learns the last values before the first message, where the database is there: its times go on from those."""
-        if (storage := self.connection.opened) is not None:
-            try:
-                self._learn(storage)
-            except Unavailable as error:
-                log.warning("the database went away at the start: %s", error)
-
     @property
     def due(self) -> float | None:
         """When the database is tried again, or the restoring or a cron strategy is due."""
@@ -124,6 +115,7 @@ class Persistence:
 
     def handle(self, message: Message, now: float) -> tuple[Message, ...]:
         """Takes a message for the next tick."""
+        self._prepare(now)
         if message.topic in ABOUT_BROKER:
             self._about_broker(message, now)
             return ()
@@ -148,7 +140,7 @@ class Persistence:
         except Unavailable as error:
             raise Unavailable(f"{error}; {self._broker.waits(now)}") from error
         try:
-            self._learn(storage)
+            self._learn(storage, now)
             self._decide(storage)
             if fired := self._timetable.fired(now):
                 self._batch.extend(self._decisions.fired(fired, storage.items, lambda: self._next_time(now)))
@@ -187,20 +179,37 @@ class Persistence:
         return [topics.DIAGNOSTICS.message(told, component=f"{self._name}/broker")]
 
     def _next_time(self, at: float) -> int:
-        """Microseconds, never the same twice and never back: a clock that steps back must not reorder rows."""
+        """Microseconds, never the same twice and never back: a clock that steps back must not reorder rows.
+
+        From further ahead than is believed it does go back: all rows would be late by that, until that time has come.
+        """
         microseconds = round(at * 1e6)
         behind = self._time - microseconds
-        if behind > CLOCK_STEP_US:
+        if self._time >= ahead.believed(at):
+            log.warning("the clock was %.1f days ahead; times go on from %.0f", behind / 86_400e6, at)
+            self._time = 0
+        elif behind > CLOCK_STEP_US:
             if not self.counters["clock_steps"]:
                 log.warning("the clock is %.1f s behind what is stored; times go on from there", behind / 1e6)
             self.counters["clock_steps"] += 1
         self._time = self._writers.next_time(microseconds, self._time)
         return self._time
 
-    def _learn(self, storage: Storage) -> None:
+    def _prepare(self, now: float) -> None:
+        """Learns the last values before the first message, where the database is there: its times go on from those."""
+        if not self._learnt and (storage := self.connection.opened) is not None:
+            try:
+                self._learn(storage, now)
+            except Unavailable as error:
+                self.connection.lost(error, now)
+
+    def _learn(self, storage: Storage, now: float) -> None:
         if self._learnt:
             return
-        last = storage.last_values()
+        last, odd = ahead.last_values(storage, now)
+        if odd:
+            names = ", ".join(sample.item for sample in odd)
+            log.warning("rows whose time has not come are left alone, see `apartment db check`: %.200s", names)
         self._decisions.learn(last, storage.last_diagnostics())
         self._decisions.again.learn(reading.open_orders(storage), reading.newest_missions(storage, again.MISSIONS))
         self._time = max([self._time, *(sample.time for sample in last.values())])

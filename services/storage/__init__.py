@@ -18,7 +18,7 @@ from services.storage.address import Address, read_address
 
 __all__ = [
     "Address", "Batch", "CameraOrder", "Diagnostic", "Item", "Mission", "Row", "Sample", "Scan", "SeenTurn", "Sighting",
-    "Storage", "open_plain", "open_ready", "open_storage", "read_address",
+    "Storage", "open_plain", "open_ready", "open_storage", "read_address", "schema_version",
 ]  # fmt: skip
 BACKENDS = {"mysql": "services.storage.mysql", "sqlite": "services.storage.sqlite"}
 VERSIONED = {  # whether there are tables of ours
@@ -282,9 +282,7 @@ def open_ready(address: Address) -> Storage:
     """
     storage = open_plain(address)
     try:
-        newest = max(migrate.versions(address.dialect))
-        there = storage.read(VERSIONED[address.dialect])
-        found = int(storage.read("SELECT COALESCE(MAX(version), 0) FROM schema_version")[0][0]) if there else 0
+        newest, found = max(migrate.versions(address.dialect)), schema_version(storage)
         if found < newest:
             raise Unavailable(f"the tables are of version {found}, not {newest} yet: the writer brings them up to date")
         if found > newest:
@@ -293,3 +291,9 @@ def open_ready(address: Address) -> Storage:
         storage.close()
         raise
     return storage
+
+
+def schema_version(storage: Storage) -> int:
+    """The version of the tables; 0 where there are none yet."""
+    there = storage.read(VERSIONED[storage.dialect])
+    return int(storage.read("SELECT COALESCE(MAX(version), 0) FROM schema_version")[0][0]) if there else 0

@@ -6,7 +6,7 @@ that the writer touches is locked for long. Which pieces are wanted, and when: `
 
 from __future__ import annotations
 
-from services.storage import Item, Storage, reading
+from services.storage import Item, Storage, ahead, reading
 from services.storage.reading import DIALECTS, SECOND
 
 
@@ -34,9 +34,9 @@ def summarise(storage: Storage, item: Item, width: int, since_s: int, until_s: i
     return len(rows)
 
 
-def clear(storage: Storage, item: Item, until_s: int, most: int) -> int:
-    """Deletes the oldest samples before a time, `most` at most, but never the newest one; how many."""
-    newest = storage.last(item.name)
+def clear(storage: Storage, item: Item, until_s: int, most: int, now: float) -> int:
+    """Deletes the oldest samples before a time, `most` at most, but never the newest whose time has come; how many."""
+    newest = reading.before(storage, item, ahead.believed(now))
     if newest is None:
         return 0
     sql = DIALECTS[storage.dialect]

@@ -85,6 +85,29 @@ def test_force_makes_all_anew_but_what_was_brought(folder: Folder) -> None:
     assert fresh.key != server.key
 
 
+def test_a_name_more_is_added_to_the_certificates_and_nothing_else_is_new(folder: Folder) -> None:
+    def told() -> tuple[object, ...]:
+        return folder.secrets(), folder.pair("authority")
+
+    def named() -> list[list[str]]:
+        pairs = [folder.pair(name) for name in ("broker", "dashboard", "database")]
+        return [certificates.hosts(pair.certificate) for pair in pairs if pair is not None]
+
+    before, old = told(), folder.pair("broker")
+    list(fill(folder, CONFIG, ["127.0.0.1"], NOW))
+    assert folder.pair("broker") == old, "every name is there already"
+    said = list(fill(folder, CONFIG, ["new.lan", "0:0::1", "apartment.lan"], NOW))
+    assert [line for line in said if "a new certificate for apartment.lan, 127.0.0.1, new.lan, ::1" in line]
+    assert named() == [[*HOSTS, "new.lan", "::1"]] * 3
+    assert told() == before
+    new = folder.pair("broker")
+    list(fill(folder, CONFIG, ["0:0::1"], NOW))
+    assert folder.pair("broker") == new
+    list(fill(folder, CONFIG, HOSTS, NOW, force=True))
+    assert named() == [[*HOSTS, "new.lan", "::1"]] * 3
+    assert folder.pair("broker") != new
+
+
 def test_a_certificate_is_renewed_when_it_ends_soon_and_the_authority_stays(folder: Folder) -> None:
     signer, old = folder.pair("authority"), folder.pair("broker")
     assert old is not None

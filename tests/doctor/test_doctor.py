@@ -10,10 +10,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 from typing import Any
+from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
@@ -24,11 +26,13 @@ from services.doctor import broker as at_broker
 from services.doctor import machine, others
 from services.doctor.examination import examine
 from services.doctor.findings import Finding
+from services.history import Config as History
 from services.peers import Missing, embedded, free_port, mariadb, mosquitto, ros, wait_until
 from services.simulators.camera.digest import Door
 from services.simulators.camera.firmwares import PROFILES
-from services.storage import read_address
+from services.storage import open_storage, read_address, upkeep
 from tests.camera.speaking import SpeakingCamera, speaking
+from tests.databases import connected as let_in
 from tests.databases import fresh_mariadb
 
 ROOT = Path(__file__).parents[2]
@@ -100,6 +104,21 @@ def only(found: list[Finding], part: str, what: str, mend: str) -> None:
 @pytest.mark.mosquitto
 def test_a_sound_apartment_is_well(patient: Patient) -> None:
     assert patient.ill() == []
+
+
+@pytest.mark.mosquitto
+def test_it_makes_and_changes_nothing(patient: Patient) -> None:
+    file, state = patient.folder / "bus.db", patient.folder / "state"
+    found = [one.what for one in examine(patient.file(), patient.environment)]
+    assert f"no file {file} yet: the first who writes makes it" in found
+    assert not file.exists()
+    assert not state.exists()
+    address = read_address(f"sqlite:///{file}")
+    open_storage(address).close()
+    upkeep.take_back(address, 3)
+    before = file.read_bytes()
+    assert "schema version 3, the writer makes it 4" in [one.what for one in others.database(address)]
+    assert file.read_bytes() == before
 
 
 @pytest.mark.mosquitto
@@ -212,6 +231,31 @@ def test_a_database_that_refuses_the_password(mariadb_server: mariadb.Server) ->
     only(list(others.database(wrong)), "database", "cannot be used", "apartment db init")
 
 
+@pytest.mark.mariadb
+def test_a_reader_or_keeper_that_may_not_do_the_work_of_history(mariadb_server: mariadb.Server, tmp_path: Path) -> None:
+    server, at = mariadb_server, fresh_mariadb(mariadb_server).address
+    open_storage(at).close()
+    told = {
+        "url": f"mysql://doctors_reader@localhost/{at.database}?socket={at.socket}", "password": "reads",
+        "keeper": {"user": "doctors_keeper", "password": "keeps"}, "keep": [{"items": ["Lab"], "raw": "7d"}],
+        "home": {"items": {"Lab": {"type": "Number", "label": "Lab"}}},
+    }  # fmt: skip
+    config = History.model_validate(told)
+    admin = upkeep.administrator(at, server.admin, None)
+    try:
+        assert [one.good for one in others.readers(config)] == [False, False]
+        upkeep.make_account(config.address, admin, upkeep.READING)
+        upkeep.make_account(config.keeping_address, admin, upkeep.READING)
+        only([one for one in others.readers(config) if not one.good], "database", "doctors_keeper .* 1142", "db init")
+        upkeep.make_account(config.keeping_address, admin, upkeep.KEEPING)
+        assert [one.good for one in others.readers(config)] == [True, True]
+        wrong = History.model_validate({**told, "password": "forgotten"})
+        only([one for one in others.readers(wrong) if not one.good], "database", "doctors_reader .* 1045", "db init")
+    finally:
+        with let_in(server, server.admin, "", None) as root:
+            root.query("DROP USER IF EXISTS doctors_reader@localhost, doctors_keeper@localhost")
+
+
 @pytest.mark.mosquitto
 def test_a_camera_that_is_off_and_one_with_another_password(patient: Patient) -> None:
     only(patient.ill(cameras__ip1__password="not the right one"), "camera ip1", "", "secrets set CAMERA_IP1_PASSWORD")
@@ -242,6 +286,54 @@ def test_a_name_that_the_robot_cannot_resolve(tmp_path: Path) -> None:
     only([one for one in found if not one.good], "ros", "nobody.invalid", "export ROS_IP=")
 
 
+@pytest.fixture
+def master() -> Iterator[str]:
+    """The address of a ROS master that knows nobody."""
+    with SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False) as server:
+        server.register_function(lambda caller: [1, "", [[], [], []]], "getSystemState")
+        serving = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        serving.start()
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+        serving.join()
+
+
+class Systemd:
+    """A `systemctl` that knows one unit, or none."""
+
+    def __init__(self, folder: Path) -> None:
+        self._file = folder / "systemctl"
+        self.knows("not-found")
+
+    def knows(self, load: str, environment: str = "") -> None:
+        told = f"LoadState={load}\\nEnvironment={environment}\\n"
+        answer = f'[ "$3" = apartment-bridge.service ] && printf "{told}"'
+        self._file.write_text(f"#!/bin/sh\n{answer}\n")
+        self._file.chmod(0o700)
+
+
+@pytest.fixture
+def systemd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Systemd:
+    (tmp_path / "programs").mkdir()
+    monkeypatch.setenv("PATH", f"{tmp_path / 'programs'}:{os.environ['PATH']}")
+    return Systemd(tmp_path / "programs")
+
+
+@pytest.mark.mosquitto
+def test_ros_is_looked_at_as_the_bridge_sees_it(patient: Patient, master: str, systemd: Systemd) -> None:
+    patient.told["bus"]["accounts"]["bridge"] = "long enough a password"
+    shutil.copy(ROOT / "config/bridge.yaml", patient.folder)
+    patient.environment |= {"ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}", "ROS_IP": "127.0.0.1"}
+    only(patient.ill(bridge={"rules": "bridge.yaml"}), "ros", "no master", "bridge.master_uri")
+    assert patient.ill(bridge__master_uri=master) == [], "the setting goes before the environment"
+    systemd.knows("loaded", "'A=b c' ROS_HOSTNAME=nobody.invalid")
+    mend = "systemctl edit apartment-bridge.service: [Service] Environment=ROS_IP="
+    only(patient.ill(), "ros", "itself nobody.invalid", mend)
+    patient.environment["ROS_IP"] = "nobody.invalid"
+    systemd.knows("loaded", "ROS_IP=127.0.0.1")
+    assert patient.ill() == [], "what the shell says is nothing to the service"
+
+
 @pytest.mark.mosquitto
 def test_the_command_shows_the_mend_and_ends_with_one(patient: Patient) -> None:
     patient.told["bus"]["port"] = free_port()
@@ -250,3 +342,13 @@ def test_the_command_shows_the_mend_and_ends_with_one(patient: Patient) -> None:
     assert done.returncode == 1, done.stderr
     assert "mend: systemctl start mosquitto" in done.stdout
     assert not [one for one in patient.told["bus"]["accounts"].values() if one in done.stdout + done.stderr]
+
+
+def test_a_mend_by_a_command_of_ours_is_for_the_same_configuration(tmp_path: Path) -> None:
+    config = tmp_path / "apartment.yaml"
+    config.write_text("bus: {accounts: {operator: '${BUS_OPERATOR_PASSWORD}'}}\n")
+    command = [sys.executable, "-m", "services", "doctor", "--config", str(config)]
+    nothing = {**os.environ, "APARTMENT_SECRETS": str(tmp_path / "none.yaml")}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=ROOT, env=nothing, check=False)
+    assert "mend: apartment secrets init\n" in done.stdout, done.stderr
+    assert f"each `apartment ...` with --config {config}" in done.stdout

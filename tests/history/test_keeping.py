@@ -112,6 +112,52 @@ def test_the_service_keeps_house_in_pieces_between_questions(storage: Storage, d
     service.close()
 
 
+def test_the_newest_that_has_its_time_is_kept_beside_a_forecast(storage: Storage) -> None:
+    storage.write(Batch([Sample("Temp", (T0 + 400 * DAY) * US, 9.0, None)]))
+    list(pieces(storage, LINES, T0 + 20 * DAY))
+    newest = float((T0 + 10 * DAY - 60) // 60 % 100)
+    assert [one.num for one in storage.samples("Temp")] == [newest, 9.0]
+
+
+def rounds(service: History, now: float, until: float) -> float:
+    """Ticks whenever one is wanted; when the last of them was."""
+    while service.due is not None and service.due <= until:
+        now = max(now, service.due)
+        service.tick(now)
+    return now
+
+
+@pytest.mark.parametrize("writes_too", [False, True])
+def test_a_clock_that_is_set_on_by_years_clears_nothing_away(
+    storage: Storage, database: Database, caplog: pytest.LogCaptureFixture, *, writes_too: bool
+) -> None:
+    service = History(lambda: open_storage(database.address), LINES)
+    now = rounds(service, T0 + 10.0 * DAY, T0 + 10.0 * DAY + 2 * ROUND_EVERY_S)
+    before = count(storage, "sample")
+    ahead = now + 1000 * DAY
+    if writes_too:  # the writer has the same clock
+        storage.write(Batch([Sample("Temp", round(ahead * US), 1.0, None)]))
+    service.tick(ahead)
+    rounds(service, ahead, ahead + DAY / 2)
+    assert count(storage, "sample") == before + writes_too
+    assert caplog.text.count("nothing is cleared away meanwhile") == 1
+    service.close()
+
+
+def test_an_apartment_that_was_away_is_kept_again_when_something_is_stored(
+    storage: Storage, database: Database
+) -> None:
+    service = History(lambda: open_storage(database.address), LINES)
+    now = T0 + 40.0 * DAY
+    service.tick(now)
+    now = rounds(service, now, now + DAY)
+    assert count(storage, "sample", "num IS NOT NULL") == 10 * DAY // 60 + 1
+    storage.write(Batch([Sample("Light", round(now * US), 0.0, "OFF")]))
+    rounds(service, now, now + 2 * ROUND_EVERY_S)
+    assert [one.num for one in storage.samples("Temp")] == [float((T0 + 10 * DAY - 60) // 60 % 100)]  # its newest
+    service.close()
+
+
 @pytest.mark.parametrize(
     ("keep", "told"),
     [

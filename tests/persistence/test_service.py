@@ -124,6 +124,44 @@ def test_times_go_on_after_a_restart_with_the_clock_behind(database: Database) -
     assert stored(database, "Power") == [(100, 1.0, None), (100.000001, 2.0, None)]
 
 
+YEARS = 3 * 365 * 86_400.0
+
+
+def test_rows_that_are_years_ahead_move_no_other_ones_time(
+    database: Database, caplog: pytest.LogCaptureFixture
+) -> None:
+    with running(database) as service:
+        turn(service, state("Power", "1 W", 1), state("Temp", "20 °C", 2), state("Temp", "35 °C", YEARS))
+    for again in range(2):
+        with running(database) as service:
+            turn(service, state("Temp", "20 °C", 100 + again), state("Power", f"{again} W", 110 + again))
+    assert "see `apartment db check`: Temp" in caplog.text
+    assert stored(database, "Power") == [(1, 1.0, None), (110, 0.0, None), (111, 1.0, None)]
+    assert stored(database, "Temp") == [(2, 20.0, None), (YEARS, 35.0, None)]  # 20 °C was no change: it was not 35
+    with running(database) as service:
+        assert connected(service, 200) == []
+        said = {one.topic: one.payload.decode() for one in turn(service, now=T + 202)}
+    assert said == {"home/Power/state": "1 W", "home/Temp/state": "20 °C"}
+
+
+def test_a_clock_that_was_ahead_for_a_minute_is_right_afterwards(
+    database: Database, caplog: pytest.LogCaptureFixture
+) -> None:
+    with running(database) as service:
+        turn(service, state("Power", "1 W", 1), state("Power", "2 W", YEARS), state("Power", "3 W", 60))
+        turn(service, state("Power", "4 W", 61))
+    assert "1095.0 days ahead" in caplog.text
+    assert stored(database, "Power") == [(1, 1.0, None), (60, 3.0, None), (61, 4.0, None), (YEARS, 2.0, None)]
+
+
+def test_a_clock_that_has_just_begun_to_count_goes_on_from_what_is_stored(database: Database) -> None:
+    with running(database) as service:
+        turn(service, state("Power", "1 W", 1))
+    with running(database) as service:
+        turn(service, state("Power", "2 W", 60 - T), state("Power", "3 W", 100))
+    assert stored(database, "Power") == [(1, 1.0, None), (1.000001, 2.0, None), (100, 3.0, None)]
+
+
 def test_a_number_in_another_unit_is_kept_as_text_and_counted(database: Database) -> None:
     with running(database) as service:
         turn(service, state("Temp", "21.5 °C", 1), state("Temp", "70 °F", 2), state("Temp", "71 °F", 3))

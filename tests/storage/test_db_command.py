@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -176,6 +177,19 @@ def test_a_jdbc_file_of_sqlite_with_the_items_names_is_imported(site: Path, data
     assert samples(database, "Kitchen_Light") == [(us("2024-06-01 10:00:00.5"), 1.0, "ON")]
 
 
+def test_forecasts_are_left_out_of_an_import_and_counted(site: Path, database: Database, tmp_path: Path) -> None:
+    with closing(sqlite3.connect(tmp_path / "openhab.db")) as made, made:
+        made.execute("CREATE TABLE Lab_Temp (time TIMESTAMP NOT NULL, value DOUBLE, PRIMARY KEY(time))")
+        for days in (-2, -1, 1, 2, 1000):
+            at = datetime.now(UTC) + timedelta(days=days)
+            made.execute("INSERT INTO Lab_Temp VALUES (?, ?)", (f"{at:%Y-%m-%d %H:%M:%S}", days))
+    source = f"sqlite:///{tmp_path}/openhab.db"
+    (told,) = json.loads(run(site, "import", source, "--json"))
+    assert (told["read"], told["future"]) == (5, 3)
+    assert "5 rows, 3 whose time has not come left out" in run(site, "import", source)
+    assert [row[1] for row in samples(database, "Lab_Temp")] == [-2.0, -1.0]
+
+
 @pytest.mark.mariadb
 def test_a_long_table_is_imported_in_pieces(
     database: Database, site: Path, openhab: Any, monkeypatch: pytest.MonkeyPatch
@@ -297,6 +311,17 @@ def test_check_tells_what_is_well(database: Database, site: Path) -> None:
     assert bad == [] or bad == [f"named time zones are missing: {upkeep.ZONES}"]
 
 
+def test_check_names_rows_whose_time_has_not_come(database: Database, site: Path) -> None:
+    storage = open_storage(database.address)
+    storage.add_items([Item("Lab_Temp", "Number"), Item("Note", "String")])
+    now = round(time.time() * 1e6)
+    rows = [Sample("Lab_Temp", us("2037-01-31 07:00:00"), 1.0, None), Sample("Note", now + 60_000_000, None, "soon")]
+    storage.write(Batch(rows))
+    storage.close()
+    told = run(site, "check", code=1)
+    assert "BAD   rows whose time has not come, which nobody goes by: Lab_Temp (2037-01-31T07:00:00Z)\n" in told
+
+
 @pytest.mark.mariadb
 class TestAccounts:
     def test_databases_and_the_writers_account_are_made_and_a_reader_sees_the_views_alone(
@@ -326,6 +351,43 @@ class TestAccounts:
                                   "USER IF EXISTS new_writer@localhost", "USER IF EXISTS grafana@localhost",
                                   "USER IF EXISTS grafana@`192.0.2.%`"):  # fmt: skip
                     root.query(f"DROP {statement}")
+
+    def test_new_passwords_of_the_configuration_are_given_to_the_accounts(
+        self, mariadb_server: mariadb.Server, tmp_path: Path
+    ) -> None:
+        """As after `apartment secrets init --force`."""
+        server, where = mariadb_server, f"localhost/forced?socket={mariadb_server.socket}"
+        config = configured(tmp_path, f"mysql://w@{where}", "old_w")
+        config.write_text(
+            config.read_text().replace("persistence: {", "persistence: {view_database: ForcedViews, ")
+            + f"history: {{url: 'mysql://r@{where}', password: old_r, keeper: {{user: k, password: old_k}}}}\n"
+        )
+        try:
+            run(config, "init", "--admin", server.admin)
+            config.write_text(config.read_text().replace("old_", "new_"))
+            run(config, "init", "--admin", server.admin)
+            for user in "wrk":
+                with connected(server, user, f"new_{user}", "forced"):
+                    pass
+                with pytest.raises(pymysql.err.OperationalError, match="1045"):
+                    connected(server, user, f"old_{user}", "forced")
+        finally:
+            with connected(server, server.admin, "", None) as root:
+                for what in ("DATABASE IF EXISTS forced", "DATABASE IF EXISTS ForcedViews",
+                             "USER IF EXISTS w@localhost, r@localhost, k@localhost"):  # fmt: skip
+                    root.query(f"DROP {what}")
+
+    def test_an_account_that_needs_no_password_goes_on_without_one(self, mariadb_server: mariadb.Server) -> None:
+        server = mariadb_server
+        writer = read_address(f"mysql://by_socket@localhost/{server.database}?socket={server.socket}")
+        with connected(server, server.admin, "", None) as root, root.cursor() as cursor:
+            cursor.execute("CREATE USER by_socket@localhost IDENTIFIED VIA unix_socket")
+            try:
+                upkeep.make_databases(writer, upkeep.administrator(writer, server.admin, None))
+                cursor.execute("SHOW CREATE USER by_socket@localhost")
+                assert "VIA unix_socket" in cursor.fetchone()[0]
+            finally:
+                cursor.execute("DROP USER by_socket@localhost")
 
     def test_a_name_that_is_no_name_is_refused(self, mariadb_server: mariadb.Server) -> None:
         database: MariaDb = fresh_mariadb(mariadb_server)
