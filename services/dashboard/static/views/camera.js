@@ -6,7 +6,7 @@ import * as live from "../live.js";
 import { joystick } from "./joystick.js";
 import { video } from "./video.js";
 
-export const topics = ["camera/#", "/dashboard/thumbnails/+"];
+export const topics = ["camera/#", "/dashboard/thumbnails/+", "/dashboard/video/+"];
 
 const LOGGED = 8;
 const MODES = { auto: "Automatic", color: "Colour", bw: "Black and white", scan: "For scans" };
