@@ -7,6 +7,7 @@ loses its queue and is given everything as it is then: nobody waits for it, and 
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import deque
 from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,7 +24,7 @@ PAST = {  # what a page is told of what was, when it opens: so many of each
     "camera/+/order_result": 40, "camera/+/scan/result": 40, "camera/+/audio": 20, "home/+/command": 40,
     "/dashboard/rates": 60, "mission/+/result": 20, "mission/+/state": 80, "robot/+/pose": 240,
 }  # fmt: skip
-BEAT_S = 10.0  # without news a page hears that we are there
+BEAT_S = 10.0  # without news a page hears that we are there; its `id`, like that of a snapshot, is our time
 Filters = tuple[str, ...]
 
 
@@ -105,7 +106,7 @@ class Hub:
                 if page.behind:
                     page.behind = False
                     page.queue.clear()
-                    yield f"event: snapshot\ndata: {self.snapshot(page.group)}\n\n"
+                    yield f"event: snapshot\nid: {_now_ms()}\ndata: {self.snapshot(page.group)}\n\n"
                 while page.queue:
                     yield f"data: {page.queue.popleft()}\n\n"
                 page.news.clear()
@@ -114,7 +115,7 @@ class Hub:
                 try:
                     await asyncio.wait_for(page.news.wait(), BEAT_S)
                 except TimeoutError:
-                    yield "event: beat\ndata:\n\n"
+                    yield f"event: beat\nid: {_now_ms()}\ndata: {{}}\n\n"
 
     def close(self) -> None:
         """Ends all pages' streams."""
@@ -146,3 +147,7 @@ class Hub:
                 while sum(len(past.text) for past in kept) > PAST_TEXT:
                     kept.popleft()
         self.latest[entry.topic] = entry
+
+
+def _now_ms() -> int:
+    return round(time.time() * 1000)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
 from typing import Any
 
 import pytest
 
 from services.bus import Message
-from services.dashboard.hub import QUEUE, Group, Hub, Page
+from services.dashboard.hub import BEAT_S, QUEUE, Group, Hub, Page
 from services.dashboard.view import BATCH_S, RATES, Entry, View, heard, sayable
 from services.errors import BadMessage
 
@@ -118,6 +119,18 @@ def test_a_page_is_given_everything_then_what_changes_of_what_it_asks_for() -> N
         assert hub.pages == 1
         await stream.aclose()  # type: ignore[attr-defined]
         assert hub.pages == 0
+
+    asyncio.run(trial())
+
+
+def test_a_page_hears_the_time_with_everything_and_again_when_nothing_else_comes() -> None:
+    async def trial() -> None:
+        stream = Hub().batches(("home/#",))
+        for kind in ("snapshot", "beat"):
+            event = await asyncio.wait_for(anext(stream), 2 * BEAT_S)
+            assert event.startswith(f"event: {kind}\nid: ")
+            assert abs(int(event.splitlines()[1].removeprefix("id: ")) / 1000 - time.time()) < 1.0
+            assert event.splitlines()[2].removeprefix("data: ")  # a browser drops events without data
 
     asyncio.run(trial())
 

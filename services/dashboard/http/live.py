@@ -71,7 +71,8 @@ def endpoints(house: House) -> list[Endpoint]:
         Endpoint("GET", "/api/broker", "anybody", "Whether the dashboard has its broker.", broker, answer=Link),
         Endpoint("GET", "/api/states", "viewer", "The newest payloads.", states, answer=States, query=(WHICH,)),
         Endpoint("GET", "/api/live", "viewer", "Everything as it is, then changes: server-sent events, each an array "
-                 "of [topic, payload, ms since 1970, kind]; the first is of type `snapshot`.", live,
+                 "of [topic, payload, ms since 1970, kind]; the first is of type `snapshot`, and after 10 s without "
+                 "news comes a `beat`: the `id` of both is the server's time.", live,
                  answer="text/event-stream", query=(WHICH,)),
         Endpoint("GET", "/api/cameras/{camera}/places", "viewer", "The places of a camera.", places, answer=PlacesOf),
     ]  # fmt: skip

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import time
+
 from starlette.responses import Response, StreamingResponse
 
 from services.dashboard.house import SNAPSHOT, House
 from services.dashboard.http.endpoint import Asked, Endpoint, one_of
 from services.dashboard.http.thumbnails import Thumbnails
-from services.dashboard.http.video import BOUNDARY, Videos
+from services.dashboard.http.video import BOUNDARY, Flow, Videos
+from services.dashboard.view import Entry
 from services.errors import BadMessage, Unavailable
 from services.payloads import RTSP_PICTURE
 
+TOPIC = "/dashboard/video/"  # our own: whether a camera's moving picture moves, while somebody looks
 MIXED = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
 
 
@@ -38,17 +43,21 @@ class Gallery:
 
     def __init__(self, house: House) -> None:
         self.house = house
-        self.videos = Videos()
+        self.videos = Videos(self._flow)
         self.thumbnails = Thumbnails(house, self.videos)
 
     async def stream(self, asked: Asked) -> Response:
-        """The camera's, for as long as the session."""
-        pictures = self.house.while_logged_in(asked.token, await self.videos.watch(self._address(asked, RTSP_PICTURE)))
+        """The camera's, for as long as the session: its service may end and come back meanwhile, elsewhere."""
+        camera = self._camera(asked)
+        parts = await self.videos.watch(camera, lambda: self._address(camera, RTSP_PICTURE))
+        pictures = self.house.while_logged_in(asked.token, parts)
         return StreamingResponse(pictures, 200, {"cache-control": "no-store"}, MIXED)
 
     async def snapshot(self, asked: Asked) -> Response:
         """The camera's."""
-        return Response(await self.videos.snapshot(self._address(asked, SNAPSHOT)), media_type="image/jpeg")
+        return Response(
+            await self.videos.snapshot(self._address(self._camera(asked), SNAPSHOT)), media_type="image/jpeg"
+        )
 
     async def scanned(self, asked: Asked) -> Response:
         """What came on `camera/<cam>/scan/image`."""
@@ -74,8 +83,12 @@ class Gallery:
     def _camera(self, asked: Asked) -> str:
         return one_of(self.house.config.cameras, asked.path("camera"), "camera")
 
-    def _address(self, asked: Asked, name: str) -> str:
-        url = self.house.picture_of(camera := self._camera(asked), name)
+    def _flow(self, camera: str, flow: Flow | None) -> None:
+        told = "" if flow is None else json.dumps({**flow._asdict(), "since": round(flow.since * 1000)})
+        self.house.hub.spread([Entry(f"{TOPIC}{camera}", told, round(time.time() * 1000), "s")])
+
+    def _address(self, camera: str, name: str) -> str:
+        url = self.house.picture_of(camera, name)
         if not url:
             raise Unavailable(f"the service of {camera} has not said where its picture is")
         return url

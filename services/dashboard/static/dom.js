@@ -96,9 +96,12 @@ export function clock(ms) {
   return new Date(ms).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false });
 }
 
+/** The same again takes the place of the one before: a joystick gives three orders a second. */
 export function toast(message, kind = "info") {
   const shown = h("p", { class: `toast ${kind}` }, message);
-  document.getElementById("toasts").append(shown);
+  const all = document.getElementById("toasts");
+  for (const one of [...all.children]) if (one.textContent === message) one.remove();
+  all.append(shown);
   setTimeout(() => shown.remove(), kind === "bad" ? 8000 : 4000);
 }
 

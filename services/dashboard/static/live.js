@@ -3,6 +3,8 @@
 
 const HIDDEN_S = 15;
 const AGAIN_S = 2;
+const SILENT_S = 25; // the server says something every 10 s: a network that takes everything and brings nothing is noticed
+const LOOK_S = 5;
 const ALWAYS = ["/dashboard/broker", "service/+/status", "camera/+/order_result"];
 
 const latest = new Map();
@@ -10,6 +12,10 @@ let watchers = [];
 let wanted = [];
 let source = null;
 let again = 0;
+let looks = 0;
+let asked = 0;
+let heard = 0; // ms by our clock, as `asked`
+let ahead = 0; // ms: the server's clock before ours
 let hide = 0;
 let lost = () => {};
 let state = "connecting";
@@ -78,7 +84,16 @@ export function batches(take) {
 }
 
 /** Whether we hear the apartment: "live", "connecting", or "broker" when the dashboard has no broker. */
-export const connection = () => (state === "live" && get("/dashboard/broker")?.text === "offline" ? "broker" : state);
+export const connection = () => (state === "live" && get("/dashboard/broker")?.text !== "online" ? "broker" : state);
+
+/** What time it is where `at` of messages comes from, ms: this machine's clock may be another. */
+export const now = () => Date.now() + ahead;
+
+/** Up to when what is shown is what is, ms by our clock; 0: nothing has come yet. */
+export const until = () => (connection() === "broker" && get("/dashboard/broker") ? get("/dashboard/broker").at - ahead : heard);
+
+/** Whether a service has ended, by its own word or its last will; one that nobody has heard of has not. */
+export const gone = (service) => get(`service/${service}/status`)?.text === "offline";
 
 /** Asks for these topics from now on; `onLost` is called when the server sends us away (the session has ended). */
 export function listen(topics, onLost) {
@@ -95,23 +110,42 @@ export function end() {
   wanted = [];
   latest.clear();
   clearTimeout(again);
+  clearInterval(looks);
+  state = "connecting";
+  heard = 0;
 }
 
 function connect() {
   clearTimeout(again);
   source?.close();
+  clearInterval(looks);
   if (!wanted.length) return;
+  asked = Date.now();
+  looks = setInterval(look, LOOK_S * 1000);
   source = new EventSource(`/api/live?topics=${encodeURIComponent(wanted.join(","))}`);
-  source.addEventListener("snapshot", (event) => {
+  const hear = (type, then) => source.addEventListener(type, (event) => {
+    heard = Date.now();
+    then(event);
+  });
+  hear("snapshot", (event) => {
+    ahead = event.lastEventId - heard;
     forget();
     take(JSON.parse(event.data), false);
     tell("live");
   });
-  source.onmessage = (event) => take(JSON.parse(event.data), true);
+  hear("beat", (event) => { ahead = Math.max(ahead, event.lastEventId - heard); }); // the quickest is nearest to the truth
+  hear("message", (event) => take(JSON.parse(event.data), true));
   source.onerror = () => {
     tell("connecting");
     if (source?.readyState === EventSource.CLOSED) again = setTimeout(comeBack, AGAIN_S * 1000);
   };
+}
+
+/** A connection that says nothing is none, whatever the browser believes. */
+function look() {
+  if (!source || Date.now() - Math.max(asked, heard) < SILENT_S * 1000) return;
+  tell("connecting");
+  connect();
 }
 
 /** Without what this view does not hear any more: it would grow old unseen. */
@@ -164,7 +198,13 @@ document.addEventListener("visibilitychange", () => {
       source?.close();
       source = null;
     }, HIDDEN_S * 1000);
-  } else if (!source && wanted.length) {
+  } else if (source) {
+    look();
+  } else if (wanted.length) {
+    tell("connecting");
     connect();
   }
 });
+
+/** Another network: connections of the one before may say nothing for ever. */
+window.addEventListener("online", () => source && connect());

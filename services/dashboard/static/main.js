@@ -1,7 +1,8 @@
 // The frame around the views: who is logged in, where one is, light or dark, and whether we hear the apartment.
 
 import * as api from "./api.js";
-import { h, icon, text, toast } from "./dom.js";
+import { clock, h, icon, text, toast } from "./dom.js";
+import { forget } from "./given.js";
 import * as live from "./live.js";
 
 const VIEWS = [
@@ -10,11 +11,14 @@ const VIEWS = [
 ];
 const THEMES = ["auto", "light", "dark"];
 const LINK = { live: "Live", connecting: "Connecting …", broker: "No broker" };
+const CUT = { connecting: "No connection to the dashboard", broker: "The dashboard has no broker, so nothing can be ordered" };
+const CUT_MS = 1500; // a connection that is back sooner disturbs nobody
 
 const app = document.getElementById("app");
 let context = null;
 let leave = () => {};
 let showing = 0;
+let cut = 0;
 
 function theme(name) {
   if (name === "auto") delete document.documentElement.dataset.theme;
@@ -37,11 +41,7 @@ function themeButton() {
 
 function frame() {
   const links = VIEWS.map(([name, title]) => h("a", { href: `#/${name}`, "data-view": name }, icon(name), h("span", {}, title)));
-  const link = h("span", { class: "link", role: "status" }, LINK.connecting);
-  document.addEventListener("connection", (event) => {
-    text(link, LINK[event.detail]);
-    link.dataset.state = event.detail;
-  });
+  const link = h("span", { class: "link", role: "img" });
   const who = context.session.login
     ? h("button", { class: "quiet", onclick: logout, title: "Log out" }, icon("leave"), h("span", { class: "label" }, context.session.user))
     : null;
@@ -51,8 +51,28 @@ function frame() {
       h("div", { class: "brand" }, h("img", { src: "/icon.svg", alt: "", width: 26, height: 26 }), h("span", {}, "Apartment"), link),
       h("nav", { "aria-label": "Views" }, links),
       h("div", { class: "foot" }, role, themeButton(), who)),
-    h("main", { id: "main", tabindex: "-1" }),
+    h("div", { class: "page" }, h("div", { class: "cut", role: "status" }), h("main", { id: "main", tabindex: "-1" })),
   );
+  linked();
+}
+
+/** Says whether we hear the apartment: a dot, and in words where we do not, since all that is shown is old then. */
+function linked() {
+  const [link, banner, now] = [app.querySelector(".link"), app.querySelector(".cut"), live.connection()];
+  if (!link || link.dataset.state === now) return;
+  link.dataset.state = now;
+  link.title = LINK[now];
+  link.setAttribute("aria-label", LINK[now]);
+  clearTimeout(cut);
+  if (now === "live") return cutOff(banner, "");
+  const say = () => cutOff(banner, `${CUT[now]}. ${live.until() ? `What is shown is of ${clock(live.until())} or before.` : ""}`);
+  if (banner.textContent) say();
+  else cut = setTimeout(say, CUT_MS);
+}
+
+function cutOff(banner, words) {
+  text(banner, words);
+  document.body.classList.toggle("cut-off", words !== "");
 }
 
 async function show() {
@@ -83,6 +103,9 @@ async function logout() {
 
 async function login() {
   live.end();
+  forget();
+  clearTimeout(cut);
+  document.body.classList.remove("cut-off");
   leave();
   leave = () => {};
   window.removeEventListener("hashchange", show);
@@ -103,6 +126,8 @@ async function enter(session) {
   window.addEventListener("hashchange", show);
   await show();
 }
+
+document.addEventListener("connection", linked);
 
 /** An order's end is told wherever one is; only what was ordered from a page of this browser. */
 live.watch("camera/+/order_result", (entry) => {

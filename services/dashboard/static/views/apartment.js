@@ -1,20 +1,19 @@
 // The plan: rooms, what stands in them, devices, where each camera looks, markers that were found, robots and their way.
 
-import * as api from "../api.js";
-import { ago, badge, h, head, icon, s, text } from "../dom.js";
+import { ago, badge, clock, h, head, icon, s, text } from "../dom.js";
+import { forget, give } from "../given.js";
 import * as live from "../live.js";
+import { NOTHING } from "./device.js";
+import { looking, place, rad, round } from "./looking.js";
 import { WORDS } from "./missions.js";
 
 export const topics = ["home/+/state", "camera/+/position", "camera/+/status", "camera/+/marker/+", "camera/+/scan/state", "robot/+/pose", "mission/+/state"];
 
+const HOME = "openhab"; // who answers a command by the item's state
 const MARGIN = 0.35;
-const REACH = 9; // m: how far a level look is drawn
 const TRAIL = 240;
-const PER_LEVEL = 0.375; // of a zoom that nobody calibrated
 const SIGMAS = 2;
-const STEPS = 12;
-const rad = (degrees) => (degrees * Math.PI) / 180;
-const round = (number) => Math.round(number * 1000) / 1000;
+const SILENT_S = 10; // a robot that has not said for so long where it is is away, as for the mission
 
 export function show(root, { apartment, may }) {
   const plan = apartment.plan;
@@ -56,6 +55,7 @@ export function show(root, { apartment, may }) {
   for (const camera of apartment.cameras) if (camera.mount) looking({ camera, map, layers, side, stops });
   markers({ map, layers, side, stops });
   for (const robot of apartment.robots) driving({ robot, map, layers, side, stops });
+  stops.push(() => forget(HOME));
   return () => { for (const stop of stops) stop(); };
 }
 
@@ -119,11 +119,14 @@ function devices({ apartment, may, map, layers, rooms, stops }) {
     const at = apartment.plan.at[name] ?? apartment.plan.at[item.thing];
     if (!at || [...shown.values()].some((one) => one.thing === item.thing && item.thing)) continue;
     const [x, y] = map(...at);
-    const words = s("title", {}, item.label);
+    const words = s("title", {}, `${item.label}: state unknown`);
     const toggles = may && item.commands && item.type === "Switch";
-    const mark = s("g", { class: "thing", transform: `translate(${x} ${y})`, role: toggles ? "button" : "img", tabindex: toggles ? "0" : null, "aria-label": item.label, "data-item": name },
+    const mark = s("g", { class: "thing unknown", transform: `translate(${x} ${y})`, role: toggles ? "button" : "img", tabindex: toggles ? "0" : null, "aria-label": `${item.label}: state unknown`, "data-item": name },
       words, s("circle", { r: 0.17 }), place(icon(item.icon)));
-    const turn = () => api.order(`/api/items/${name}/command`, { value: shown.get(name).state === "ON" ? "OFF" : "ON" });
+    const turn = () => {
+      const value = shown.get(name).state === "ON" ? "OFF" : "ON";
+      give(item.label, HOME, `/api/items/${name}/command`, { value }, (entry) => entry.topic === `home/${name}/state` && entry.text === value);
+    };
     if (toggles) {
       mark.addEventListener("click", turn);
       mark.addEventListener("keydown", (event) => {
@@ -142,8 +145,10 @@ function devices({ apartment, may, map, layers, rooms, stops }) {
     if (known) {
       known.state = entry.text;
       known.mark.classList.toggle("on", ["ON", "OPEN", "PLAY"].includes(entry.text) || (["Dimmer", "Color"].includes(item.type) && Number.parseFloat(entry.text.split(",").at(-1)) > 0));
-      text(known.words, `${item.label}: ${entry.text}`);
-      known.mark.setAttribute("aria-label", `${item.label}: ${entry.text}`);
+      known.mark.classList.toggle("unknown", NOTHING.has(entry.text));
+      const told = `${item.label}: ${NOTHING.has(entry.text) ? "state unknown" : entry.text}`;
+      text(known.words, told);
+      known.mark.setAttribute("aria-label", told);
     }
     const room = item && rooms.get(item.room);
     if (!room) return;
@@ -158,80 +163,6 @@ function devices({ apartment, may, map, layers, rooms, stops }) {
   }));
 }
 
-function place(drawing) {
-  drawing.setAttribute("x", -0.11);
-  drawing.setAttribute("y", -0.11);
-  drawing.setAttribute("width", 0.22);
-  drawing.setAttribute("height", 0.22);
-  return drawing;
-}
-
-function looking({ camera, map, layers, side, stops }) {
-  const { mount, lens } = camera;
-  const view = s("path", { class: "view", "clip-path": "url(#inside)", "data-camera": camera.name });
-  const cone = s("path", { class: "cone", "clip-path": "url(#inside)" });
-  const middle = s("path", { class: "axis", "clip-path": "url(#inside)" });
-  const [x, y] = map(mount.position[0], mount.position[1]);
-  const title = s("title", {}, `Camera ${camera.name}`);
-  layers.views.append(cone, view, middle);
-  layers.things.append(s("g", { class: "thing camera-mark", transform: `translate(${x} ${y})`, role: "img", "aria-label": `Camera ${camera.name}` }, title, s("circle", { r: 0.19 }), place(icon("camera"))));
-  const state = badge("");
-  const said = h("span", { class: "hint" });
-  side.cameras.append(h("a", { class: "line-link", href: "#/camera" }, icon("camera"), h("strong", {}, camera.name), state, said));
-  stops.push(
-    live.watch(`camera/${camera.name}/status`, ({ json }) => { text(state, json.state); state.className = `badge ${json.state === "online" ? "good" : "bad"}`; }),
-    live.watch(`camera/${camera.name}/position`, ({ json }) => {
-      const times = magnified(lens, json.zoom);
-      const across = lens ? 2 * Math.atan(Math.tan(rad(lens.across_deg) / 2) / times) : rad(60);
-      const up = lens ? 2 * Math.atan(Math.tan(rad(lens.up_deg) / 2) / times) : rad(40);
-      const azimuth = rad(mount.kind === "ceiling" ? mount.yaw_deg - json.pan : mount.yaw_deg + json.pan);
-      const down = rad(json.tilt - mount.tilt_zero_deg);
-      const height = mount.position[2];
-      const seen = footprint({ azimuth, down, across, up, height, at: mount.position, map });
-      view.setAttribute("d", `M${seen.join("L")}Z`);
-      cone.setAttribute("d", `M${x} ${y}L${seen[STEPS]}L${seen[0]}M${x} ${y}L${seen[2 * STEPS]}L${seen[3 * STEPS]}`);
-      const far = floorAt(height, down);
-      const [ex, ey] = map(mount.position[0] + far * Math.cos(azimuth), mount.position[1] + far * Math.sin(azimuth));
-      middle.setAttribute("d", `M${x} ${y}L${ex} ${ey}`);
-      view.dataset.azimuth = round((azimuth * 180) / Math.PI);
-      text(said, json.moving ? "moving" : (json.place ?? `pan ${json.pan.toFixed(0)}°, tilt ${json.tilt.toFixed(0)}°`));
-    }),
-  );
-  const scanning = h("p", { class: "hint" });
-  side.cameras.append(scanning);
-  stops.push(live.watch(`camera/${camera.name}/scan/state`, ({ json }) => {
-    text(scanning, json.state === "running" ? `Scanning for ${json.targets.join(", ")}: ${Math.round(json.progress * 100)} %` : "");
-  }));
-}
-
-const floorAt = (height, down) => (down <= 0.02 ? REACH : Math.min(REACH, height / Math.tan(down)));
-
-/** The part of the floor that the picture shows, as the rays of its border hit it: STEPS points on each side. */
-function footprint({ azimuth, down, across, up, height, at, map }) {
-  const rays = [];
-  const [w, u] = [Math.tan(across / 2), Math.tan(up / 2)];
-  const border = (fx, fy) => {
-    const [x, y] = [fx * w, fy * u];
-    const out = Math.cos(down) - y * Math.sin(down);
-    const fall = Math.sin(down) + y * Math.cos(down);
-    const far = Math.hypot(out, x);
-    const reach = fall <= 0.02 * far ? REACH / far : Math.min(REACH / far, height / fall);
-    rays.push([reach * out, -reach * x]);
-  };
-  for (let i = 0; i <= STEPS; i++) border(-1 + (2 * i) / STEPS, -1);
-  for (let i = 1; i <= STEPS; i++) border(1, -1 + (2 * i) / STEPS);
-  for (let i = 1; i <= STEPS; i++) border(1 - (2 * i) / STEPS, 1);
-  for (let i = 1; i < STEPS; i++) border(-1, 1 - (2 * i) / STEPS);
-  const [c, d] = [Math.cos(azimuth), Math.sin(azimuth)];
-  return rays.map(([fx, fy]) => map(at[0] + c * fx - d * fy, at[1] + d * fx + c * fy).join(" "));
-}
-
-function magnified(lens, zoom) {
-  if (!lens?.levels.length) return 1 + PER_LEVEL * Math.max(0, zoom);
-  const above = lens.levels.find(([level]) => level >= zoom) ?? lens.levels.at(-1);
-  return above[1];
-}
-
 function markers({ map, layers, side, stops }) {
   const draw = () => {
     const found = live.all("camera/+/marker/+").map((entry) => entry.json).filter(Boolean);
@@ -243,7 +174,7 @@ function markers({ map, layers, side, stops }) {
         s("ellipse", { rx: Math.max(0.04, a), ry: Math.max(0.04, b), transform: `rotate(${-turn})` }),
         s("rect", { x: -0.075, y: -0.075, width: 0.15, height: 0.15, rx: 0.02 }), s("text", { y: -0.14 }, `${one.marker}`));
     }));
-    side.markers.replaceChildren(...found.map((one) => h("li", {}, h("strong", {}, `${one.marker}`), h("span", {}, `from ${one.place}`, h("span", { class: "hint" }, ` ${ago(Date.parse(one.stamp))}${one.covariance ? `, ± ${sure(one.covariance)} mm` : ""}`)))));
+    side.markers.replaceChildren(...found.map((one) => h("li", {}, h("strong", {}, `${one.marker}`), h("span", {}, `from ${one.place}`, h("span", { class: "hint" }, ` ${ago(Date.parse(one.stamp), live.now())}${one.covariance ? `, ± ${sure(one.covariance)} mm` : ""}`)))));
     if (!found.length) side.markers.append(h("li", { class: "hint" }, "None found yet"));
   };
   draw();
@@ -274,11 +205,26 @@ function driving({ robot, map, layers, side, stops }) {
   side.robots.append(h("a", { class: "line-link", href: "#/missions" }, icon("robot"), h("strong", {}, robot.name), state, said));
   let here = null;
   const goal = () => {
-    const mission = live.get(`mission/${robot.name}/state`)?.json;
+    const mission = live.gone("mission") ? null : live.get(`mission/${robot.name}/state`)?.json;
     const point = mission?.state === "go" ? robot.points[mission.place] : null;
     ahead.setAttribute("d", point && here ? `M${map(...here).join(" ")}L${map(...point.at).join(" ")}` : "");
   };
+  const fares = () => {
+    const mission = live.get(`mission/${robot.name}/state`)?.json;
+    const [away, pose] = [live.gone("mission"), live.get(`robot/${robot.name}/pose`)];
+    const silent = pose && live.now() - pose.at > SILENT_S * 1000;
+    text(state, away ? "mission service offline" : mission ? (WORDS[mission.state] ?? mission.state) : "");
+    state.className = `badge ${away ? "bad" : ""}`;
+    const words = !mission || mission.marker === null ? "" : `marker ${mission.marker}${mission.place ? `, ${mission.place}` : ""}`;
+    text(said, silent ? `not heard of since ${clock(pose.at)}` : away ? "" : words);
+    body.classList.toggle("gone", Boolean(silent));
+    goal();
+  };
+  const ticking = setInterval(fares, 1000);
   stops.push(
+    () => clearInterval(ticking),
+    live.watch("service/mission/status", fares),
+    live.watch(`mission/${robot.name}/state`, fares),
     live.watch(`robot/${robot.name}/pose`, ({ json }) => {
       here = toApartment(robot, json.x, json.y);
       const last = trail.at(-1);
@@ -288,11 +234,6 @@ function driving({ robot, map, layers, side, stops }) {
       const [x, y] = map(...here);
       body.setAttribute("visibility", "visible");
       body.setAttribute("transform", `translate(${x} ${y}) rotate(${round(robot.apartment_to_map.yaw_deg - json.yaw_deg)})`);
-      goal();
-    }),
-    live.watch(`mission/${robot.name}/state`, ({ json }) => {
-      text(state, WORDS[json.state] ?? json.state);
-      text(said, json.marker === null ? "" : `marker ${json.marker}${json.place ? `, ${json.place}` : ""}`);
       goal();
     }),
   );

@@ -1,12 +1,12 @@
 // A camera: its picture, turning it by click, joystick and place, its orders, its scan, its sound.
 
-import * as api from "../api.js";
 import { ago, badge, clock, h, head, icon, text } from "../dom.js";
+import { give } from "../given.js";
 import * as live from "../live.js";
 import { joystick } from "./joystick.js";
 import { video } from "./video.js";
 
-export const topics = ["camera/#", "/dashboard/thumbnails/+"];
+export const topics = ["camera/#", "/dashboard/thumbnails/+", "/dashboard/video/+"];
 
 const LOGGED = 8;
 const MODES = { auto: "Automatic", color: "Colour", bw: "Black and white", scan: "For scans" };
@@ -34,9 +34,10 @@ export function show(root, context) {
 
 function one(stage, camera, may, state) {
   const name = camera.name;
+  const service = `camera-${name}`;
   const at = (rest) => `camera/${name}/${rest}`;
-  const order = (key, value) => api.order(`/api/cameras/${name}/orders/${key}`, { value });
-  const picture = video(name, may && camera.lens && camera.mount ? (right, down) => api.order(`/api/cameras/${name}/centre`, { right, down }) : null);
+  const order = (key, value) => give(key === "Goto" ? `${key} ${value}` : key, service, `/api/cameras/${name}/orders/${key}`, { value });
+  const picture = video(name, may && camera.lens && camera.mount ? (right, down) => give("Centre", service, `/api/cameras/${name}/centre`, { right, down }) : null);
   const where = h("dl", { class: "where" });
   const streaming = h("button", { onclick: () => order("RTSP", streaming.getAttribute("aria-pressed") !== "true"), "aria-pressed": "false" }, "Live picture");
   const stops = [];
@@ -47,11 +48,19 @@ function one(stage, camera, may, state) {
       parts[0]),
     h("div", { class: "stack" }, parts.slice(1))));
 
-  state.replaceChildren(h("span", { class: "hint" }, "Its service has said nothing yet"));
+  const fares = () => {
+    const told = live.get(at("status"))?.json;
+    stage.classList.toggle("old", live.gone(service));
+    if (live.gone(service)) state.replaceChildren(badge("service offline", "bad"), h("span", { class: "hint" }, "What is shown is from before"));
+    else if (told) state.replaceChildren(badge(told.state, KINDS[told.state] ?? "bad"), h("span", { class: "hint" }, told.reason));
+    else state.replaceChildren(h("span", { class: "hint" }, "Its service has said nothing yet"));
+  };
+  fares();
   const line = (label, value) => h("div", {}, h("dt", {}, label), h("dd", {}, value));
   stops.push(
     live.values(at("position"), ({ json }) => where.replaceChildren(line("Pan", `${json.pan.toFixed(1)}°`), line("Tilt", `${json.tilt.toFixed(1)}°`), line("Zoom", `${json.zoom}`), line("Place", json.moving ? "moving …" : (json.place ?? "–")))),
-    live.values(at("status"), ({ json }) => state.replaceChildren(badge(json.state, KINDS[json.state] ?? "bad"), h("span", { class: "hint" }, json.reason))),
+    live.watch(at("status"), fares),
+    live.watch(`service/${service}/status`, fares),
     live.values(at("stream"), ({ json }) => {
       streaming.setAttribute("aria-pressed", `${json.rtsp}`);
       text(streaming, json.rtsp ? "Live picture: on" : "Live picture: off");
@@ -62,6 +71,7 @@ function one(stage, camera, may, state) {
     for (const stop of stops) stop();
     picture.close();
     stage.replaceChildren();
+    stage.classList.remove("old");
   };
 }
 
@@ -112,17 +122,20 @@ function scan(camera, may, order, stops) {
   const start = h("button", { class: "main", onclick: () => order("Scan", { targets: targets.value.split(/[^0-9]+/).filter(Boolean).map(Number) }) }, "Scan");
   const cancel = h("button", { onclick: () => order("Scan", false) }, "Cancel");
   const found = h("ul", { class: "found" });
-  stops.push(live.values(`camera/${name}/scan/state`, ({ json }) => {
-    const running = json.state === "running";
+  const fares = () => {
+    const json = live.get(`camera/${name}/scan/state`)?.json;
+    if (!json) return;
+    const running = json.state === "running" && !live.gone(`camera-${name}`);
     bar.value = running || json.state === "done" ? json.progress : 0;
     cancel.disabled = !running;
     const turn = json.turn > 1 ? `, turn ${json.turn}` : "";
-    text(said, running ? `Looking from ${json.place ?? "…"}${turn}: ${json.frames_analysed} pictures, ${Math.round(json.elapsed_s)} s` : `${ENDS[json.state]}${json.reason ? `: ${json.reason}` : ""}${json.state === "done" ? ` in ${Math.round(json.elapsed_s)} s, found ${json.found.join(", ") || "nothing"}` : ""}`);
-  }));
+    text(said, running ? `Looking from ${json.place ?? "…"}${turn}: ${json.frames_analysed} pictures, ${Math.round(json.elapsed_s)} s` : `${ENDS[json.state] ?? "It ended with its service"}${json.reason ? `: ${json.reason}` : ""}${json.state === "done" ? ` in ${Math.round(json.elapsed_s)} s, found ${json.found.join(", ") || "nothing"}` : ""}`);
+  };
+  stops.push(live.watch(`camera/${name}/scan/state`, fares), live.watch(`service/camera-${name}/status`, fares));
   const draw = () => found.replaceChildren(...live.all(`camera/${name}/marker/+`).map(({ json }) => {
     const p = json.position;
     const sigma = json.covariance ? Math.sqrt(Math.max(json.covariance[0][0], json.covariance[1][1], json.covariance[2][2])) : null;
-    return h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, `from ${json.place}`, h("span", { class: "hint" }, ` ${ago(Date.parse(json.stamp))}`)),
+    return h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, `from ${json.place}`, h("span", { class: "hint" }, ` ${ago(Date.parse(json.stamp), live.now())}`)),
       h("span", { class: "number" }, p ? `${p.x.toFixed(2)}, ${p.y.toFixed(2)}, ${p.z.toFixed(2)} m${sigma ? ` ± ${(sigma * 1000).toFixed(0)} mm` : ""}` : json.why));
   }));
   stops.push(live.watch(`camera/${name}/marker/+`, draw));

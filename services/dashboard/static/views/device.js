@@ -4,7 +4,8 @@ import * as api from "../api.js";
 import { h, icon, text, WORDS } from "../dom.js";
 
 const CONFIRM_S = 6;
-const NOTHING = new Set(["NULL", "UNDEF", ""]);
+export const NOTHING = new Set(["NULL", "UNDEF", ""]); // what an item says that nobody has told anything, or whose state was taken away
+const UNKNOWN = ", state unknown"; // for who hears a label only
 
 /** The element of an item, and what takes its states. */
 export function card(name, item, may) {
@@ -16,7 +17,13 @@ export function card(name, item, may) {
   });
   const control = may && item.commands ? controlOf(item, (command, confirms) => waiting.send(command, confirms)) : null;
   const title = h("span", { class: "title" }, h("span", { class: "name" }, item.label), note);
-  const element = h("div", { class: "card", "data-item": name }, icon(item.icon), title, control?.hides ? null : value, control?.element);
+  const element = h("div", { class: "card", "data-item": name }, icon(item.icon), title, control?.tells ? null : value, control?.element);
+  const known = (is) => {
+    element.classList.toggle("unknown", !is);
+    value.hidden = is && Boolean(control?.hides);
+    control?.known?.(is);
+  };
+  known(false);
   return {
     element,
     label: item.label,
@@ -25,7 +32,7 @@ export function card(name, item, may) {
       const shown = readable(item, entry.text);
       text(value, shown);
       element.classList.toggle("on", isOn(item, entry.text));
-      element.classList.toggle("unknown", NOTHING.has(entry.text));
+      known(!NOTHING.has(entry.text));
       control?.show(entry.text, shown);
       waiting.heard(entry.text, entry.fresh);
     },
@@ -95,12 +102,18 @@ function controlOf(item, send) {
   return made ? made(item, send) : null;
 }
 
+/** What tells in a control's label whether its state is known; those whose value stands beside them need none. */
+function naming(element) {
+  const label = element.getAttribute("aria-label");
+  return (known) => element.setAttribute("aria-label", known ? label : `${label}${UNKNOWN}`);
+}
+
 function toggle(item, send) {
   const element = h("button", { class: "switch", role: "switch", "aria-checked": "false", "aria-label": item.label, onclick: () => {
     const wanted = element.getAttribute("aria-checked") === "true" ? "OFF" : "ON";
     send(wanted);
   } }, h("span", { class: "knob" }));
-  return { element, hides: true, show: (state) => element.setAttribute("aria-checked", state === "ON" ? "true" : "false") };
+  return { element, hides: true, known: naming(element), show: (state) => element.setAttribute("aria-checked", state === "ON" ? "true" : "false") };
 }
 
 function slider(item, send) {
@@ -148,7 +161,7 @@ function player(item, send) {
   let playing = false;
   const skip = (command, label) => h("button", { onclick: () => send(command, null), "aria-label": `${item.label}: ${label}` }, icon(label));
   const element = h("span", { class: "buttons" }, skip("PREVIOUS", "previous"), play, skip("NEXT", "next"));
-  return { element, hides: true, show(state) {
+  return { element, hides: true, known: naming(play), show(state) {
     playing = state === "PLAY";
     play.replaceChildren(icon(playing ? "pause" : "play"));
   } };
@@ -158,7 +171,7 @@ function choice(item, send) {
   const element = h("select", { "aria-label": item.label, onchange: () => send(element.value) },
     h("option", { value: "", disabled: true }, "–"),
     Object.entries(item.options).map(([state, label]) => h("option", { value: state }, label)));
-  return { element, hides: true, show: (state) => { element.value = state in item.options ? state : ""; } };
+  return { element, tells: true, show: (state) => { element.value = state in item.options ? state : ""; } };
 }
 
 function colour(item, send) {
@@ -168,9 +181,9 @@ function colour(item, send) {
   } });
   const off = h("button", { onclick: () => send("OFF", (state) => number(state.split(",")[2]) === 0) }, "Off");
   off.setAttribute("aria-label", `${item.label}: off`);
-  return { element: h("span", { class: "buttons" }, element, off), hides: true, show(state) {
+  return { element: h("span", { class: "buttons" }, element, off), hides: true, known: naming(element), show(state) {
     const parts = state.split(",").map(Number);
-    if (parts.length === 3 && !parts.some(Number.isNaN)) element.value = toRgb(parts);
+    element.value = parts.length === 3 && !parts.some(Number.isNaN) ? toRgb(parts) : "#000000";
   } };
 }
 

@@ -7,7 +7,7 @@ export const topics = ["diagnostics/#", "service/+/info", "/dashboard/rates"];
 
 const LEVELS = ["OK", "Warning", "Error", "Stale"];
 const KINDS = ["good", "warn", "bad", "stale"];
-const STALE_S = 5;
+const STALE_S = 5; // everything tells how it fares once a second
 const KEPT = 60; // rates in the small plot
 const DRAW_MS = 500;
 
@@ -17,6 +17,7 @@ export function show(root) {
   const services = h("tbody");
   const rates = h("div", { class: "rates" });
   const open = new Set();
+  const rows = new Map(); // by path: a row stays the same element, so that whoever reads it by the keyboard stays there
   const history = new Map();
   root.append(
     head("Health", worst),
@@ -30,43 +31,56 @@ export function show(root) {
 
   function drawTree() {
     const top = branches(live.all("diagnostics/#"));
-    tree.replaceChildren(...top.children.map((node) => item(node)));
+    arrange(tree, top.children.map(row));
     text(worst, LEVELS[top.level]);
     worst.className = `badge ${KINDS[top.level]}`;
   }
 
-  function item(node) {
-    const unfolds = node.children.length > 0 || Object.keys(node.values ?? {}).length > 0;
-    const isOpen = open.has(node.path) || (node.children.length > 0 && !open.has(`-${node.path}`));
+  /** The row of a component as it is now, and what is under it. */
+  function row(node) {
+    const made = rows.get(node.path) ?? item(node.path, node.name);
+    rows.set(node.path, made);
+    const { element, fold, dot, said, under } = made;
+    const pairs = Object.entries(node.values ?? {});
+    const unfolds = node.children.length > 0 || pairs.length > 0;
+    const isOpen = unfolds && (open.has(node.path) || (node.children.length > 0 && !open.has(`-${node.path}`)));
+    if (unfolds) element.setAttribute("aria-expanded", `${isOpen}`);
+    else element.removeAttribute("aria-expanded");
+    text(fold, unfolds ? (isOpen ? "▾" : "▸") : "");
+    dot.className = `dot ${KINDS[node.level]}`;
+    dot.setAttribute("aria-label", LEVELS[node.level]);
+    text(said, node.message ?? "");
+    under.hidden = !isOpen;
+    arrange(under, isOpen ? [...node.children.map(row), ...pairs.map(([name, value]) => pair(made.pairs, name, value))] : []);
+    return element;
+  }
+
+  function item(path, name) {
     const turn = () => {
-      const was = row.getAttribute("aria-expanded") === "true";
-      open.delete(was ? node.path : `-${node.path}`);
-      open.add(was ? `-${node.path}` : node.path);
+      const was = element.getAttribute("aria-expanded") === "true";
+      open.delete(was ? path : `-${path}`);
+      open.add(was ? `-${path}` : path);
       drawTree();
-      tree.querySelector(`[data-path="${CSS.escape(node.path)}"]`)?.focus();
+      element.focus();
     };
     const keys = (event) => {
-      const rows = [...tree.querySelectorAll("[role=treeitem]")];
-      const at = rows.indexOf(row);
-      if (event.key === "ArrowDown") rows[at + 1]?.focus();
-      else if (event.key === "ArrowUp") rows[at - 1]?.focus();
-      else if (unfolds && (event.key === "Enter" || event.key === " " || event.key === (isOpen ? "ArrowLeft" : "ArrowRight"))) turn();
+      const all = [...tree.querySelectorAll("[role=treeitem]")];
+      const at = all.indexOf(element);
+      const expanded = element.getAttribute("aria-expanded");
+      if (event.key === "ArrowDown") all[at + 1]?.focus();
+      else if (event.key === "ArrowUp") all[at - 1]?.focus();
+      else if (expanded && (event.key === "Enter" || event.key === " " || event.key === (expanded === "true" ? "ArrowLeft" : "ArrowRight"))) turn();
       else return;
       event.preventDefault();
       event.stopPropagation();
     };
-    const row = h("li", { role: "treeitem", tabindex: "0", "data-path": node.path, "aria-expanded": unfolds ? `${isOpen}` : null, onkeydown: keys },
-      h("div", { class: "line", onclick: unfolds ? turn : null },
-        h("span", { class: "fold", "aria-hidden": "true" }, unfolds ? (isOpen ? "▾" : "▸") : ""),
-        h("span", { class: `dot ${KINDS[node.level]}`, role: "img", "aria-label": LEVELS[node.level] }),
-        h("span", { class: "name" }, node.name), h("span", { class: "said" }, node.message ?? "")));
-    if (isOpen && unfolds) row.append(h("ul", { role: "group" }, node.children.map(item), values(node.values)));
-    return row;
-  }
-
-  function values(found) {
-    return Object.entries(found ?? {}).map(([name, value]) =>
-      h("li", { class: "pair", role: "none" }, h("span", {}, name.replaceAll("_", " ")), h("span", {}, value)));
+    const fold = h("span", { class: "fold", "aria-hidden": "true" });
+    const dot = h("span", { role: "img" });
+    const said = h("span", { class: "said" });
+    const under = h("ul", { role: "group" });
+    const line = h("div", { class: "line", onclick: () => element.hasAttribute("aria-expanded") && turn() }, fold, dot, h("span", { class: "name" }, name), said);
+    const element = h("li", { role: "treeitem", tabindex: "0", "data-path": path, onkeydown: keys }, line, under);
+    return { element, fold, dot, said, under, pairs: new Map() };
   }
 
   function drawServices() {
@@ -76,7 +90,7 @@ export function show(root) {
       const counters = info?.counters ?? {};
       const kind = entry.text === "online" ? "good" : "bad";
       return h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, badge(entry.text, kind)),
-        h("td", {}, info ? ago(Date.parse(info.started)) : ""), ...["received", "published", "bad"].map((key) => h("td", { class: "number" }, `${counters[key] ?? ""}`)));
+        h("td", {}, info ? ago(Date.parse(info.started), live.now()) : ""), ...["received", "published", "bad"].map((key) => h("td", { class: "number" }, `${counters[key] ?? ""}`)));
     });
     services.replaceChildren(...rows);
   }
@@ -91,11 +105,7 @@ export function show(root) {
   };
 
   const draw = () => {
-    const focused = tree.contains(document.activeElement) ? document.activeElement : null;
-    if (!focused?.matches(":focus-visible")) { // a screen reader would be told the same again and again
-      drawTree();
-      if (focused) tree.querySelector(`[data-path="${CSS.escape(focused.dataset.path)}"]`)?.focus();
-    }
+    drawTree();
     drawServices();
   };
   draw();
@@ -109,6 +119,21 @@ export function show(root) {
   };
 }
 
+/** Makes these the children, in this order. Those that stay are not taken out, which would take the focus from them. */
+function arrange(list, wanted) {
+  const stays = new Set(wanted);
+  for (const child of [...list.children]) if (!stays.has(child)) child.remove();
+  wanted.forEach((child, index) => { if (list.children[index] !== child) list.insertBefore(child, list.children[index] ?? null); });
+}
+
+/** One of the values of a component; `known` are the lines that it has already. */
+function pair(known, name, value) {
+  const line = known.get(name) ?? h("li", { class: "pair", role: "none" }, h("span", {}, name.replaceAll("_", " ")), h("span"));
+  known.set(name, line);
+  text(line.lastChild, value);
+  return line;
+}
+
 function branches(entries) {
   const top = { name: "", path: "", children: [], level: 0 };
   for (const entry of entries.sort((one, other) => one.topic.localeCompare(other.topic))) {
@@ -119,7 +144,7 @@ function branches(entries) {
       if (!next) node.children.push((next = { name, path, children: [], level: 0 }));
       node = next;
     }
-    const late = Date.now() - entry.at > STALE_S * 1000 && entry.fresh;
+    const late = live.now() - entry.at > STALE_S * 1000;
     node.level = late ? 3 : (entry.json?.level ?? 3);
     node.message = entry.json?.message;
     node.values = entry.json?.values;

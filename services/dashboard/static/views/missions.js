@@ -2,11 +2,13 @@
 
 import * as api from "../api.js";
 import { ago, badge, clock, h, head, text } from "../dom.js";
+import { forget, give } from "../given.js";
 import * as live from "../live.js";
 
 export const topics = ["mission/#", "robot/+/goto/result"];
 
 const SHOWN = 20;
+const SERVICE = "mission";
 const ENDS = { found: "good", not_found: "warn", failed: "bad", cancelled: "", refused: "bad" };
 export const WORDS = { idle: "Waiting for orders", go: "On the way", look: "Looking", scan: "The house looks", found: "Found", not_found: "Not found", failed: "Failed", cancelled: "Cancelled", refused: "Refused" };
 
@@ -14,17 +16,21 @@ export function show(root, { apartment, may }) {
   root.append(head("Missions"));
   const closes = apartment.robots.map((robot) => one(root, robot.name, may));
   if (!apartment.robots.length) root.append(h("p", { class: "empty" }, "No robot is configured."));
-  return () => { for (const close of closes) close(); };
+  return () => {
+    for (const close of closes) close();
+    forget(SERVICE);
+  };
 }
 
 function one(root, name, may) {
   const marker = h("input", { id: `marker-${name}`, type: "number", min: 0, max: 9999, required: true, value: "582" });
   const id = () => Number(marker.value);
-  const cancel = h("button", { class: "danger", onclick: () => api.order(`/api/missions/${name}/cancel`) }, "Cancel");
-  const where = h("button", { onclick: () => api.order(`/api/missions/${name}/where`, { find: id() }), type: "button" }, "Where was it last?");
+  const changes = ({ topic, fresh }) => fresh && topic.startsWith(`mission/${name}/`); // a cancel has no id of its own
+  const cancel = h("button", { class: "danger", onclick: () => give("Cancel", SERVICE, `/api/missions/${name}/cancel`, {}, changes) }, "Cancel");
+  const where = h("button", { onclick: () => give("Where was it last", SERVICE, `/api/missions/${name}/where`, { find: id() }), type: "button" }, "Where was it last?");
   const submit = (event) => {
     event.preventDefault();
-    api.order(`/api/missions/${name}/find`, { find: id() });
+    give(`Find ${id()}`, SERVICE, `/api/missions/${name}/find`, { find: id() });
   };
   const now = h("p", { class: "now" });
   const why = h("p", { class: "hint" }, "The mission service has said nothing yet.");
@@ -45,10 +51,22 @@ function one(root, name, may) {
     results.replaceChildren(...newest.map((result, index) => told(result, index === 0 || open.has(result.id))));
     if (!newest.length) results.append(h("p", { class: "empty" }, "None yet."));
   };
-  const stops = [
-    live.values(`mission/${name}/state`, ({ json, at }) => {
+  const fares = () => {
+    const json = live.get(`mission/${name}/state`)?.json;
+    const away = live.gone(SERVICE);
+    now.parentElement.classList.toggle("old", away);
+    if (away) {
+      text(now, "The mission service is offline");
+      text(why, "What is shown is from before.");
+    } else if (json) {
       text(now, `${WORDS[json.state] ?? json.state}${json.marker === null ? "" : `: marker ${json.marker}`}${json.place ? `, ${json.place}` : ""}`);
       text(why, [json.reason, json.waiting.length ? `${json.waiting.length} waiting` : ""].filter(Boolean).join(" · "));
+    }
+  };
+  const stops = [
+    live.watch(`service/${SERVICE}/status`, fares),
+    live.values(`mission/${name}/state`, ({ json, at }) => {
+      fares();
       cancel.disabled = json.id === null && !json.waiting.length;
       if (json.id === null) return;
       if (states.length && states.at(-1).id !== json.id) states.length = 0;
@@ -64,7 +82,7 @@ function one(root, name, may) {
     live.values(`mission/${name}/where/reply/+`, ({ json, fresh }) => {
       if (!fresh) return;
       answer.parentElement.hidden = false;
-      answer.replaceChildren(...json.sightings.map((seen) => h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, `${seen.place ?? "somewhere"}, by ${seen.by}`, h("span", { class: "hint" }, ` ${ago(Date.parse(seen.stamp))}`)),
+      answer.replaceChildren(...json.sightings.map((seen) => h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, `${seen.place ?? "somewhere"}, by ${seen.by}`, h("span", { class: "hint" }, ` ${ago(Date.parse(seen.stamp), live.now())}`)),
         h("span", { class: "number" }, seen.position ? `${seen.position.x.toFixed(2)}, ${seen.position.y.toFixed(2)} m` : "", seen.sigma_m ? ` ± ${(seen.sigma_m * 1000).toFixed(0)} mm` : ""))));
       if (!json.sightings.length) answer.append(h("li", {}, `Nobody has seen marker ${json.marker}`));
     }),
@@ -95,7 +113,7 @@ function told(result, open) {
     return part;
   });
   const position = result.position ? `${result.position.x.toFixed(2)}, ${result.position.y.toFixed(2)} m` : "";
-  return h("details", { open, "data-mission": result.id }, h("summary", {}, h("strong", {}, `Marker ${result.marker}`), badge(WORDS[result.state] ?? result.state, ENDS[result.state]), h("span", { class: "hint" }, `${[result.place, position, result.by ? `by ${result.by}` : ""].filter(Boolean).join(" · ")}`), h("span", { class: "hint number" }, `${ago(Date.parse(result.stamp))} · ${Math.round(result.elapsed_s)} s`)),
+  return h("details", { open, "data-mission": result.id }, h("summary", {}, h("strong", {}, `Marker ${result.marker}`), badge(WORDS[result.state] ?? result.state, ENDS[result.state]), h("span", { class: "hint" }, `${[result.place, position, result.by ? `by ${result.by}` : ""].filter(Boolean).join(" · ")}`), h("span", { class: "hint number" }, `${ago(Date.parse(result.stamp), live.now())} · ${Math.round(result.elapsed_s)} s`)),
     result.reason ? h("p", { class: "hint" }, result.reason) : null,
     h("div", { class: "bars", "aria-hidden": "true" }, bars),
     h("ol", { class: "timeline" }, result.story.map((event) => line(event.state, `${event.at_s.toFixed(0)} s`, event.text, false))));
