@@ -149,7 +149,7 @@ def _fill_certificates(folder: Folder, hosts: Sequence[str], now: datetime, *, f
         known = certificates.hosts(old.certificate) if old is not None else []
         wanted = list(dict.fromkeys([*known, *map(_plain, hosts)]))
         if force or wanted != known:
-            folder.keep_pair(name, certificates.server(signer, name, wanted, now))
+            folder.keep_pair(name, certificates.server(signer, name, wanted, now, None if force else old))
             yield f"{folder.path / name}: a new certificate for {', '.join(wanted)}"
 
 
