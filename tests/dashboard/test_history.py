@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser, expect
 
 from services import peers, topics
 from services.bus import Message
@@ -19,6 +20,7 @@ from services.history.service import History
 from services.payloads import seconds, stamp
 from services.payloads.history import HistoryReply
 from services.storage import Batch, Item, Sample, open_storage
+from tests.dashboard.browser import page
 from tests.dashboard.parts import Running, running
 
 pytestmark = pytest.mark.mosquitto
@@ -138,3 +140,17 @@ def test_what_is_too_much_begins_where_it_is_known_and_says_so(house: Running) -
     assert series["rows"][:2] == [[known, "OFF"], [known, "ON"]]
     assert refused.status_code == 422
     assert f"ask from since={stamp(known)} on" in refused.json()["error"]
+
+
+def test_a_page_says_from_when_on_it_shows_what_was(house: Running, chromium: Browser) -> None:
+    with answering(house, endless), page(chromium, house.url) as shown:
+        shown.goto("/#/history/Kitchen_Light")
+        expect(shown.get_by_role("img", name="Kitchen light")).to_be_visible()
+        expect(shown.locator(".plots .why")).to_contain_text("Kitchen light: too much for one plot, shown from")
+
+
+def test_a_page_that_shows_all_says_nothing_of_the_kind(stored: Running, chromium: Browser) -> None:
+    with page(chromium, stored.url) as shown:
+        shown.goto("/#/history/Kitchen_Light")
+        expect(shown.get_by_role("img", name="Kitchen light")).to_be_visible()
+        expect(shown.locator(".plots .why")).to_have_count(0)
