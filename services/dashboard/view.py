@@ -17,7 +17,7 @@ from services.topic import Kind
 
 BATCH_S = 0.1  # at most ten batches a second; a change after a pause goes out at once
 MOST_EVENTS = 2000  # in a batch; the oldest go
-LONGEST = 16 * 1024  # characters of a payload; more is cut, it is for reading
+LONGEST = 16 * 1024  # characters of a text; more is cut, it is for reading. JSON is whole, since half of it is none
 RATES = "/dashboard/rates"  # our own topic: messages per second, by the first level of their topics
 RATES_S = 2.0
 KINDS = {Kind.STATE: "s", Kind.EVENT: "e", Kind.COMMAND: "c", Kind.BLOB: "b"}
@@ -55,7 +55,8 @@ class View:
         kind = KINDS[row.kind]
         text = f"{len(message.payload):,} bytes" if kind == "b" else message.payload.decode("utf-8", "replace")
         self._counts[message.topic.partition("/")[0]] += 1
-        entry = Entry(message.topic, text[:LONGEST], round(message.received * 1000), kind)
+        shown = text[:LONGEST] if row.payload is str else text
+        entry = Entry(message.topic, shown, round(message.received * 1000), kind)
         if kind in "sb":
             self._states[entry.topic] = entry
         else:

@@ -10,7 +10,8 @@ import pytest
 from services.dashboard.hub import PAST_TEXT, QUEUE, QUEUE_TEXT, Group, Hub, Page
 from services.dashboard.latest import MOST_TEXT, MOST_TOPICS
 from services.dashboard.service import LINK
-from tests.dashboard.test_view import entry, rows
+from services.dashboard.view import LONGEST, View
+from tests.dashboard.test_view import entry, rows, said
 
 
 def room(hub: Hub, kind: str, many: int = MOST_TOPICS, text: str = "x") -> None:
@@ -83,3 +84,14 @@ def test_a_page_that_does_not_read_holds_few_characters() -> None:
         assert page.behind
 
     asyncio.run(trial())
+
+
+def test_json_is_whole_however_long_and_a_text_is_cut() -> None:
+    view = View()
+    places = {f"Place {number}": {"pan": 1.0, "tilt": 2.0, "zoom": 0.0, "preset": None} for number in range(500)}
+    view.take(said("camera/ip1/places", json.dumps(places)), 100.0)
+    view.take(said("home/A/state", "x" * 2 * LONGEST), 100.0)
+    whole, cut = (one.text for one in view.batch(100.0))
+    assert len(whole) > LONGEST
+    assert json.loads(whole) == places
+    assert cut == "x" * LONGEST

@@ -121,6 +121,17 @@ def test_it_is_taken_again_after_an_hour_only_and_kept_over_a_restart(camera: Ca
     assert all(one.topic == f"{TOPIC}ip1" for one in camera.told)
 
 
+def test_one_camera_whose_words_are_none_takes_nothing_from_the_others(
+    camera: Camera, caplog: pytest.LogCaptureFixture
+) -> None:
+    camera.thumbnails.house.config.cameras = ["ip0", "ip1"]  # type: ignore[misc, assignment]
+    camera.topics["camera/ip0/places"] = "{"
+    camera.at("Sofa")
+    camera.look(STANDS_S + 1)
+    assert camera.shows("Sofa") == 1
+    assert caplog.text.count("no small pictures of ip0") == 1
+
+
 def test_a_camera_without_a_picture_is_left_alone_for_a_while(camera: Camera) -> None:
     camera.away = True
     camera.at("Sofa")

@@ -39,6 +39,7 @@ class Thumbnails:
         self._asked: set[tuple[str, str]] = set()  # the disk was asked once; what comes later comes from us
         self._not_before: dict[str, float] = {}
         self._stands: dict[str, tuple[str, float]] = {}  # by camera, at which place and since when
+        self._trouble: dict[str, str] = {}  # by camera, what was told last
 
     async def run(self) -> None:
         """Until it is cancelled."""
@@ -49,9 +50,12 @@ class Thumbnails:
     async def look(self, now: float) -> None:
         """Takes those that are due; called again and again."""
         for camera in self.house.config.cameras:
-            place = self._due(camera, now)
-            if place is not None:
-                await self._take(camera, place, now)
+            try:
+                place = self._due(camera, now)
+                if place is not None:
+                    await self._take(camera, place, now)
+            except (ValueError, OSError) as error:  # words that are none, a file that cannot be read: of this one alone
+                self._troubled(camera, str(error))
 
     def get(self, camera: str, place: str) -> bytes | None:
         """The picture of a place."""
@@ -75,6 +79,12 @@ class Thumbnails:
             return None
         found = self._known(camera, position.place)
         return position.place if found is None or now - found[0] > AGAIN_S else None
+
+    def _troubled(self, camera: str, why: str) -> None:
+        """Told once."""
+        if self._trouble.get(camera) != why:
+            self._trouble[camera] = why
+            log.warning("no small pictures of %s: %s", camera, why)
 
     async def _take(self, camera: str, place: str, now: float) -> None:
         url = self.house.picture_of(camera, SNAPSHOT)

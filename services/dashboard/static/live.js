@@ -63,6 +63,11 @@ export function watch(filter, take) {
   };
 }
 
+/** The same for those that have a value: without what is taken away, and what is no JSON. */
+export const values = (filter, take) => watch(filter, (entry) => {
+  if (entry.json !== null) take(entry);
+});
+
 /** Calls `take(entries)` once for every batch, for views that draw everything anew. */
 export function batches(take) {
   const watcher = { batch: take };
@@ -132,10 +137,19 @@ function take(rows, fresh) {
     else latest.set(entry.topic, entry);
   }
   for (const watcher of [...watchers]) {
-    if (watcher.batch) watcher.batch(came);
-    else for (const entry of came) if (watcher.exact ? watcher.exact === entry.topic : watcher.matches(entry.topic)) watcher.take(entry);
+    if (watcher.batch) alone(watcher.batch, came);
+    else for (const entry of came) if (watcher.exact ? watcher.exact === entry.topic : watcher.matches(entry.topic)) alone(watcher.take, entry);
   }
   if (rows.some((row) => row[0] === "/dashboard/broker")) tell(state);
+}
+
+/** One watcher that fails takes nothing from the others. */
+function alone(call, value) {
+  try {
+    call(value);
+  } catch (error) {
+    reportError(error);
+  }
 }
 
 function tell(now) {

@@ -50,9 +50,9 @@ function one(stage, camera, may, state) {
   state.replaceChildren(h("span", { class: "hint" }, "Its service has said nothing yet"));
   const line = (label, value) => h("div", {}, h("dt", {}, label), h("dd", {}, value));
   stops.push(
-    live.watch(at("position"), ({ json }) => where.replaceChildren(line("Pan", `${json.pan.toFixed(1)}°`), line("Tilt", `${json.tilt.toFixed(1)}°`), line("Zoom", `${json.zoom}`), line("Place", json.moving ? "moving …" : (json.place ?? "–")))),
-    live.watch(at("status"), ({ json }) => state.replaceChildren(badge(json.state, KINDS[json.state] ?? "bad"), h("span", { class: "hint" }, json.reason))),
-    live.watch(at("stream"), ({ json }) => {
+    live.values(at("position"), ({ json }) => where.replaceChildren(line("Pan", `${json.pan.toFixed(1)}°`), line("Tilt", `${json.tilt.toFixed(1)}°`), line("Zoom", `${json.zoom}`), line("Place", json.moving ? "moving …" : (json.place ?? "–")))),
+    live.values(at("status"), ({ json }) => state.replaceChildren(badge(json.state, KINDS[json.state] ?? "bad"), h("span", { class: "hint" }, json.reason))),
+    live.values(at("stream"), ({ json }) => {
       streaming.setAttribute("aria-pressed", `${json.rtsp}`);
       text(streaming, json.rtsp ? "Live picture: on" : "Live picture: off");
       picture.show(json.rtsp);
@@ -112,7 +112,7 @@ function scan(camera, may, order, stops) {
   const start = h("button", { class: "main", onclick: () => order("Scan", { targets: targets.value.split(/[^0-9]+/).filter(Boolean).map(Number) }) }, "Scan");
   const cancel = h("button", { onclick: () => order("Scan", false) }, "Cancel");
   const found = h("ul", { class: "found" });
-  stops.push(live.watch(`camera/${name}/scan/state`, ({ json }) => {
+  stops.push(live.values(`camera/${name}/scan/state`, ({ json }) => {
     const running = json.state === "running";
     bar.value = running || json.state === "done" ? json.progress : 0;
     cancel.disabled = !running;
@@ -159,7 +159,7 @@ function analysed(name, may, order, stops) {
 }
 
 /** Calls `take(value)` for each order of that key that was done: nothing else tells how some options stand. */
-const ordered = (name, key, take) => live.watch(`camera/${name}/order_result`, ({ json }) => json.key === key && json.state === "done" && take(json.value));
+const ordered = (name, key, take) => live.values(`camera/${name}/order_result`, ({ json }) => json.key === key && json.state === "done" && take(json.value));
 const flag = (value) => ["true", "on", "1"].includes(`${value}`.toLowerCase());
 
 function looks(name, order, stops) {
@@ -183,7 +183,7 @@ function sound(name, order, stops) {
   const files = h("datalist", { id: "files" });
   const heard = h("p", { class: "hint" });
   const known = new Set();
-  stops.push(live.watch(`camera/${name}/audio`, ({ json }) => {
+  stops.push(live.values(`camera/${name}/audio`, ({ json }) => {
     known.add(json.file);
     files.replaceChildren(...[...known].map((one) => h("option", { value: one })));
     text(heard, `Recorded ${json.file}, ${json.seconds.toFixed(1)} s`);
@@ -196,7 +196,7 @@ function sound(name, order, stops) {
 function log(name, stops) {
   const list = h("ol", { class: "log" }, h("li", { class: "hint" }, "None yet"));
   const orders = new Map();
-  stops.push(live.watch(`camera/${name}/order_result`, ({ json, at }) => {
+  stops.push(live.values(`camera/${name}/order_result`, ({ json, at }) => {
     orders.delete(json.id);
     orders.set(json.id, { json, at });
     const shown = [...orders.values()].filter((one) => one.json.key !== "Move" || one.json.error).slice(-LOGGED).reverse();

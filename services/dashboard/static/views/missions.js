@@ -46,7 +46,7 @@ function one(root, name, may) {
     if (!newest.length) results.append(h("p", { class: "empty" }, "None yet."));
   };
   const stops = [
-    live.watch(`mission/${name}/state`, ({ json, at }) => {
+    live.values(`mission/${name}/state`, ({ json, at }) => {
       text(now, `${WORDS[json.state] ?? json.state}${json.marker === null ? "" : `: marker ${json.marker}`}${json.place ? `, ${json.place}` : ""}`);
       text(why, [json.reason, json.waiting.length ? `${json.waiting.length} waiting` : ""].filter(Boolean).join(" · "));
       cancel.disabled = json.id === null && !json.waiting.length;
@@ -56,12 +56,12 @@ function one(root, name, may) {
       if (!last || last.state !== json.state || last.place !== json.place || last.reason !== json.reason) states.push({ ...json, at });
       steps.replaceChildren(...states.map((step, index) => line(step.state, clock(step.at), step.reason || step.place, index === states.length - 1)));
     }),
-    live.watch(`mission/${name}/result`, ({ json }) => {
+    live.values(`mission/${name}/result`, ({ json }) => {
       past.set(json.id, json);
       draw();
       if (states.at(-1)?.id === json.id) states.length = 0;
     }),
-    live.watch(`mission/${name}/where/reply/+`, ({ json, fresh }) => {
+    live.values(`mission/${name}/where/reply/+`, ({ json, fresh }) => {
       if (!fresh) return;
       answer.parentElement.hidden = false;
       answer.replaceChildren(...json.sightings.map((seen) => h("li", {}, h("strong", {}, `${json.marker}`), h("span", {}, `${seen.place ?? "somewhere"}, by ${seen.by}`, h("span", { class: "hint" }, ` ${ago(Date.parse(seen.stamp))}`)),
