@@ -244,6 +244,22 @@ def test_an_order_that_is_wrong_is_told_why(guarded: Running, path: str, body: o
     assert why in answer.json()["error"]
 
 
+@pytest.mark.parametrize(
+    ("path", "text", "why"),
+    [
+        ("/api/cameras/ip1/position", '{"pan": 1e305}', "pan: "),
+        ("/api/cameras/ip1/orders/Zoom", '{"value": 1e400}', "value: "),
+        ("/api/cameras/ip1/orders/Scan", '{"value": {"targets": [-1e400]}}', "value: "),
+    ],
+)
+def test_a_number_that_nobody_can_take_is_told(guarded: Running, path: str, text: str, why: str) -> None:
+    with guarded.browser("ann") as person:
+        headers = {"X-CSRF-Token": person.csrf, "Content-Type": "application/json"}
+        answer = person.http.post(path, content=text, headers=headers)
+    assert answer.status_code == 422
+    assert answer.json()["error"].startswith(why)
+
+
 def test_a_body_that_nobody_needs_is_refused(guarded: Running) -> None:
     with guarded.browser("ann") as person:
         assert person.post("/api/publish", {"topic": "x", "payload": "x" * 70_000}).status_code == 413
@@ -338,7 +354,15 @@ def test_the_newest_analysed_picture_of_a_scan_can_be_fetched(guarded: Running) 
 
 
 @pytest.mark.parametrize(
-    "query", ["since=yesterday", "since=2026-02-01T00:00:00Z&until=2026-01-01T00:00:00Z", "points=0", "points=9999999"]
+    "query",
+    [
+        "since=yesterday",
+        "since=2026-02-01T00:00:00Z&until=2026-01-01T00:00:00Z",
+        "until=0001-01-01T00:00:00Z",
+        "points=0",
+        "points=9999999",
+        f"points={'9' * 5000}",
+    ],
 )
 def test_a_span_that_is_none_is_told(guarded: Running, query: str) -> None:
     with guarded.browser("vic") as person:

@@ -18,8 +18,8 @@ from tests.dashboard.browser import WAIT_MS, view
 pytestmark = [pytest.mark.mosquitto, pytest.mark.chromium]
 
 RESULT = {
-    "camera": "ip1", "marker": 999, "dictionary": "DICT_5X5_1000", "place": "Kitchen", "position": None, "why": "one look",
-    "first_seen": "2026-01-31T07:05:00.123Z", "stamp": "2026-01-31T07:05:00.123Z", "scan": "tried",
+    "camera": "ip1", "marker": 999, "dictionary": "DICT_5X5_1000", "place": "Kitchen", "position": None,
+    "why": "one look", "first_seen": "2026-01-31T07:05:00.123Z", "stamp": "2026-01-31T07:05:00.123Z", "scan": "tried",
 }  # fmt: skip
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Awaitable, Callable
-from typing import Any
 
 from pydantic import Field
 
@@ -13,7 +12,7 @@ from services.bus import Message
 from services.dashboard.house import House
 from services.dashboard.http.endpoint import Asked, Body, Done, Endpoint, one_of
 from services.errors import BadMessage
-from services.payloads import Order, Position, PositionSet
+from services.payloads import Free, Order, Position, PositionSet, Real
 from services.payloads.robot import MissionOrder, Where
 
 
@@ -26,15 +25,15 @@ class Value(Body):
 class OrderValue(Body):
     """The value of an order: what stands in the contract's table of orders."""
 
-    value: Any = ""
+    value: Free = ""
 
 
 class Goal(Body):
     """Where to look, degrees as the camera reads them; what is left out stays."""
 
-    pan: float | None = None
-    tilt: float | None = None
-    zoom: float | None = None
+    pan: Real | None = None
+    tilt: Real | None = None
+    zoom: Real | None = None
 
 
 class Click(Body):

@@ -103,7 +103,7 @@ def _good(reply: HistoryReply) -> HistoryReply:
 
 def _span(asked: Asked) -> tuple[float, float]:
     until = _time(asked, "until", time.time())
-    since = _time(asked, "since", until - 86400.0)
+    since = _time(asked, "since", max(seconds("0001-01-01T00:00:00Z"), until - 86400.0))
     if not 0 < until - since < 1e10:
         raise BadMessage("since: expected a time before until")
     return since, until
@@ -119,7 +119,7 @@ def _time(asked: Asked, name: str, default: float) -> float:
 
 def _points(asked: Asked) -> int:
     text = asked.query("points", str(POINTS))
-    if not text.isdecimal() or not 1 <= int(text) <= MOST_POINTS:
+    if not text.isdecimal() or not 1 <= int(text[:9]) <= MOST_POINTS:
         raise BadMessage(f"points: expected 1 to {MOST_POINTS}, got {text[:20]!r}")
     return int(text)
 
