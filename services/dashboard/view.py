@@ -13,7 +13,7 @@ from typing import NamedTuple
 from services import topics
 from services.bus import Message
 from services.errors import BadMessage
-from services.topic import Kind
+from services.topic import Kind, Topic
 
 BATCH_S = 0.1  # at most ten batches a second; a change after a pause goes out at once
 MOST_EVENTS = 2000  # in a batch; the oldest go
@@ -50,8 +50,7 @@ class View:
 
     def take(self, message: Message, now: float) -> None:
         """Notes a message; BadMessage when it is not what the table of topics says, so that pages may trust it."""
-        cleared = message.retain and not message.payload
-        row = topics.find(message.topic)[0] if cleared else topics.read(message, now).topic
+        row = _row(message, now)
         kind = KINDS[row.kind]
         text = f"{len(message.payload):,} bytes" if kind == "b" else message.payload.decode("utf-8", "replace")
         self._counts[message.topic.partition("/")[0]] += 1
@@ -86,6 +85,15 @@ class View:
             self.tell(RATES, json.dumps(rates), now)
         self._counts = Counter(dict.fromkeys(rates, 0))
         self._counted_from = now
+
+
+def _row(message: Message, now: float) -> Topic:
+    """Its topic's; an empty message takes away what was retained, also when it says so to those who listen already."""
+    if not message.payload:
+        row = topics.find(message.topic)[0]
+        if message.retain or row.kind is Kind.STATE:
+            return row
+    return topics.read(message, now).topic
 
 
 def heard(account: str = "dashboard") -> tuple[str, ...]:

@@ -276,6 +276,19 @@ def test_states_and_places_can_be_asked_for(guarded: Running) -> None:
         assert person.get("/api/states", params={"topics": "home/<x>"}).status_code == 422
 
 
+def test_a_state_that_somebody_takes_away_is_gone(guarded: Running) -> None:
+    topic = "camera/ip1/scan/state"
+    guarded.bus.say(topic, '{"state": "idle"}', retain=True)
+    with guarded.browser("vic") as person:
+
+        def kept() -> bool:
+            return topic in person.get("/api/states", params={"topics": topic}).json()
+
+        peers.wait_until(kept, "the state")
+        guarded.bus.say(topic, "", retain=True)
+        peers.wait_until(lambda: not kept(), "the state to go")
+
+
 def test_a_page_hears_of_a_change_within_a_moment(guarded: Running) -> None:
     with (
         guarded.browser("vic") as person,

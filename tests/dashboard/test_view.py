@@ -53,6 +53,7 @@ def test_messages_per_second_are_told_by_the_first_level() -> None:
         ("nowhere/at/all", "1", "no topic like"),
         ("camera/ip1/position", '{"pan": "x"}', "pan"),
         ("camera/ip1/places", "[", "places"),
+        ("camera/ip1/order_result", "", "payload"),
     ],
 )
 def test_what_is_not_as_the_table_says_never_comes_to_a_page(topic: str, text: str, fault: str) -> None:
@@ -62,9 +63,10 @@ def test_what_is_not_as_the_table_says_never_comes_to_a_page(topic: str, text: s
     assert view.due is None
 
 
-def test_a_retained_topic_that_was_taken_away_is_told_as_that() -> None:
+@pytest.mark.parametrize("retain", [True, False])  # without: it came while we listened (MQTT 5, 3.3.1.3)
+def test_a_retained_topic_that_was_taken_away_is_told_as_that(retain: bool) -> None:
     view = View()
-    view.take(said("camera/ip1/marker/582", "")._replace(retain=True), 100.0)
+    view.take(said("camera/ip1/marker/582", "")._replace(retain=retain), 100.0)
     assert view.batch(100.0) == (Entry("camera/ip1/marker/582", "", 0, "s"),)
 
 
