@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from services.installation.layout import BROKER, STATE, SYSTEM, Part
-from services.installation.units import memory, written
+from services.installation.units import BROKER_MB, memory, written
 
 FOLDER = "${APARTMENT:-/etc/apartment}"  # on the machine; what `apartment install` writes
 LOGS = {"driver": "local", "options": {"max-size": "10m", "max-file": "5"}}
@@ -68,7 +68,7 @@ def _broker() -> dict[str, Any]:
         image="eclipse-mosquitto:2.0",
         command=["mosquitto", "-c", f"{BROKER}/mosquitto.conf"],
         volumes=[f"{FOLDER}/broker:{BROKER}:ro", "broker:/var/lib/mosquitto"],
-        mem_limit="400m",
+        mem_limit=f"{BROKER_MB}m",
     )
 
 

@@ -13,6 +13,7 @@ from services.installation.layout import BROKER, DATABASE, GROUP, STATE, SYSTEM,
 # The most memory (MB) that a service may take before it is ended and started again; twice what it was seen to need.
 MEMORY = {"camera": 1200, "simulated-camera": 800, "bridge": 500, "dashboard": 300}
 OTHERS = 250
+BROKER_MB = 400  # its full queue (mosquitto.conf) takes two thirds; ended for more, it would read the same back
 HARDENED = """\
 NoNewPrivileges=yes
 CapabilityBoundingSet=
@@ -159,7 +160,7 @@ ExecReload=
 ExecReload=/bin/kill -HUP $MAINPID
 Restart=always
 RestartSec=2
-MemoryMax=400M
+MemoryMax={BROKER_MB}M
 """
 
 

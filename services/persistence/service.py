@@ -43,7 +43,7 @@ class Config(DatabaseSection):
     """The section `persistence`."""
 
     restore_after_s: float = Field(default=2.0, ge=0)  # how long retained states may come after all that waited
-    broker_queue: int = Field(default=1_000_000, ge=1)  # the broker's max_queued_messages, as in mosquitto.conf
+    broker_queue: int = Field(default=500_000, ge=1)  # the broker's max_queued_messages, as in mosquitto.conf
     name: str = "persistence"
     strategies: Path | None = None  # persistence.yaml; without it `persist` of each item in home.yaml says when
     writers: Writers = Writers()  # one, unless it is said that there are more
