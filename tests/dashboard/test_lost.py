@@ -60,7 +60,7 @@ def begun(alone: Running) -> None:
     say(alone, "camera/ip1/places", {"Sofa": {"pan": 41.0, "tilt": 30.0}})
     say(alone, "camera/ip1/scan/state", {"state": "running", "targets": [582], "place": "Sofa", "progress": 0.4})
     mission = {"state": "go", "id": "one", "marker": 582, "place": "sofa", "since": "2026-01-31T07:05:00Z"}
-    say(alone, "mission/tiago/state", mission)
+    say(alone, "mission/tiago/state", {**mission, "reason": "on the way to sofa", "waiting": []})
 
 
 BRIGHT = """() => {
@@ -151,13 +151,32 @@ def test_an_order_that_nobody_answers_is_told(alone: Running, shown: Page) -> No
 
 def unanswered(shown: Page, control: Locator, told: str) -> None:
     """Presses it; when the time for an answer is over it is told, and that goes away by and by."""
-    with shown.expect_response(lambda answer: answer.request.method == "POST") as taken:
-        control.press("Enter")
-    assert taken.value.status == 202
+    ordered(shown, control)
     shown.clock.fast_forward(NO_ANSWER_MS)
     expect(shown.locator(".toast.bad")).to_have_text(told)
     shown.clock.fast_forward(NO_ANSWER_MS)
     expect(shown.locator(".toast")).to_have_count(0)
+
+
+def ordered(shown: Page, control: Locator) -> str | None:
+    """Presses it; the id of the order that goes out."""
+    with shown.expect_response(lambda answer: answer.request.method == "POST") as taken:
+        control.press("Enter")
+    assert taken.value.status == 202
+    found: str | None = taken.value.json()["id"]
+    return found
+
+
+def test_the_cancel_of_a_mission_sends_no_robot(alone: Running, shown: Page) -> None:
+    begun(alone)
+    view(shown, "missions")
+    sent: list[str] = []
+    shown.on(
+        "request", lambda request: sent.append(request.url.rpartition("/")[2]) if request.method == "POST" else None
+    )
+    ordered(shown, shown.get_by_role("button", name="Cancel"))
+    ordered(shown, shown.get_by_role("button", name="Where was it last?"))
+    assert sent == ["cancel", "where"]
 
 
 def test_an_order_that_is_answered_is_left_alone_until_its_service_goes_away(alone: Running, shown: Page) -> None:
@@ -165,10 +184,7 @@ def test_an_order_that_is_answered_is_left_alone_until_its_service_goes_away(alo
     view(shown, "camera")
     log, toasts = shown.locator(".log li"), shown.locator(".toast")
     for state in ("running", "done"):
-        alone.bus.forget()
-        shown.locator(".places button").click()
-        order = json.loads(alone.bus.until(lambda one: one.topic == "camera/ip1/order/Goto", SOON_S).payload)
-        result = {"id": order["id"], "key": "Goto", "value": "Sofa", "state": state}
+        result = {"id": ordered(shown, shown.locator(".places button")), "key": "Goto", "value": "Sofa", "state": state}
         alone.bus.say("camera/ip1/order_result", json.dumps(result))
         expect(log.first).to_contain_text(state)
         shown.clock.fast_forward(NO_ANSWER_MS)
@@ -262,6 +278,7 @@ def test_a_state_that_nobody_knows_is_not_shown_as_off(alone: Running, shown: Pa
     cards = {item: shown.locator(f"[data-item={item}]") for item in items}
     for card in cards.values():
         expect(card.locator(".value")).to_have_text("–")  # nobody has said anything
+    expect(shown.locator("[data-item=Bedroom_Mode] select")).to_have_value("")
     switch, play = cards["Kitchen_Light"].get_by_role("switch"), cards["Radio_Player"].locator("button").nth(1)
     off = {"Kitchen_Light": "OFF", "Radio_Player": "PAUSE", "Lamp_Color": "0,0,0"}
     for unknown in ("NULL", "UNDEF"):

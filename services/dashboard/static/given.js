@@ -12,7 +12,7 @@ const open = new Set();
 /** One order. Its answers carry its id; an answer may come before we know that. */
 class Given {
   constructor(what, service, answers) {
-    Object.assign(this, { what, service, answers, id: null, early: [], said: "", timer: 0 });
+    Object.assign(this, { what, service, answers, id: null, early: [], said: "", at: 0, timer: 0 });
     open.add(this);
   }
 
@@ -26,9 +26,10 @@ class Given {
     if (this.id === null) {
       this.early.push(entry);
     } else if (this.answers(entry, this.id)) {
+      const said = entry.json?.state ?? "";
+      if (entry.at < this.at || (entry.at === this.at && said === this.said)) return; // told again to a page that came back
       clearTimeout(this.timer);
-      this.timer = 0;
-      this.said = entry.json?.state ?? "";
+      Object.assign(this, { said, at: entry.at, timer: 0 });
       if (!this.service.startsWith("camera-") || ENDS.has(this.said)) this.end();
     }
   }

@@ -107,7 +107,7 @@ function places(name, may, order, stops) {
   };
   draw();
   stops.push(live.watch(`camera/${name}/places`, draw), live.watch(`camera/${name}/position`, draw), live.watch(`/dashboard/thumbnails/${name}`, draw));
-  const remove = h("button", { class: "quiet", onclick: () => {
+  const remove = h("button", { class: "quiet", type: "button", onclick: () => {
     const here = live.get(`camera/${name}/position`)?.json?.place;
     if (here && confirm(`Forget the place ${here}?`)) order("Remove", here);
   } }, "Forget this place");

@@ -169,7 +169,7 @@ function player(item, send) {
 
 function choice(item, send) {
   const element = h("select", { "aria-label": item.label, onchange: () => send(element.value) },
-    h("option", { value: "", disabled: true }, "–"),
+    h("option", { value: "", disabled: true, selected: true }, "–"),
     Object.entries(item.options).map(([state, label]) => h("option", { value: state }, label)));
   return { element, tells: true, show: (state) => { element.value = state in item.options ? state : ""; } };
 }

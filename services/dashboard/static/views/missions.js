@@ -26,7 +26,7 @@ function one(root, name, may) {
   const marker = h("input", { id: `marker-${name}`, type: "number", min: 0, max: 9999, required: true, value: "582" });
   const id = () => Number(marker.value);
   const changes = ({ topic, fresh }) => fresh && topic.startsWith(`mission/${name}/`); // a cancel has no id of its own
-  const cancel = h("button", { class: "danger", onclick: () => give("Cancel", SERVICE, `/api/missions/${name}/cancel`, {}, changes) }, "Cancel");
+  const cancel = h("button", { class: "danger", type: "button", onclick: () => give("Cancel", SERVICE, `/api/missions/${name}/cancel`, {}, changes) }, "Cancel");
   const where = h("button", { onclick: () => give("Where was it last", SERVICE, `/api/missions/${name}/where`, { find: id() }), type: "button" }, "Where was it last?");
   const submit = (event) => {
     event.preventDefault();
