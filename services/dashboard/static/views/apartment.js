@@ -225,7 +225,7 @@ function driving({ robot, map, layers, side, stops }) {
     () => clearInterval(ticking),
     live.watch("service/mission/status", fares),
     live.watch(`mission/${robot.name}/state`, fares),
-    live.watch(`robot/${robot.name}/pose`, ({ json }) => {
+    live.values(`robot/${robot.name}/pose`, ({ json }) => {
       here = toApartment(robot, json.x, json.y);
       const last = trail.at(-1);
       if (!last || Math.hypot(here[0] - last[0], here[1] - last[1]) > 0.03) trail.push(here);

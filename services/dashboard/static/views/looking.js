@@ -49,7 +49,7 @@ export function looking({ camera, map, layers, side, stops }) {
     live.watch(`camera/${camera.name}/status`, fares),
     live.watch(`camera/${camera.name}/scan/state`, fares),
     live.watch(`service/${service}/status`, fares),
-    live.watch(`camera/${camera.name}/position`, ({ json }) => {
+    live.values(`camera/${camera.name}/position`, ({ json }) => {
       const times = magnified(lens, json.zoom);
       const across = lens ? 2 * Math.atan(Math.tan(rad(lens.across_deg) / 2) / times) : rad(60);
       const up = lens ? 2 * Math.atan(Math.tan(rad(lens.up_deg) / 2) / times) : rad(40);
