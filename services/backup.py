@@ -16,7 +16,7 @@ from pathlib import Path, PurePath, PurePosixPath
 from services import __version__
 from services.config import Apartment
 from services.errors import ConfigError
-from services.storage import Address, Storage, dump, open_plain, open_storage, upkeep
+from services.storage import Address, Storage, dump, open_plain, open_storage, schema_version
 from services.whole_file import PRIVATE, whole_file, write_whole
 
 FORM = 1  # of the archive
@@ -49,7 +49,7 @@ def _save_parts(archive: zipfile.ZipFile, apartment: Apartment, database: Addres
         yield f"{folder}: {len(files)} files"
     if database is not None:
         with closing(open_storage(database)) as storage:
-            made["schema"] = str(upkeep.version(storage))
+            made["schema"] = str(schema_version(storage))
             with archive.open(DATABASE, "w", force_zip64=True) as lines:
                 count = sum(1 for line in dump.lines(storage) if lines.write(line.encode() + b"\n"))
         yield f"{database}: {count} rows"
@@ -150,7 +150,7 @@ def put_rows_back(file: Path, database: Address) -> Iterator[str]:
         if DATABASE not in archive.namelist():
             return
         with closing(open_storage(database)) as storage, archive.open(DATABASE) as lines:
-            if int(told["schema"]) > (own := upkeep.version(storage)):
+            if int(told["schema"]) > (own := schema_version(storage)):
                 raise ConfigError([f"{file}: its schema has version {told['schema']}, this program knows {own}"])
             _expect_empty(storage, database)
             counted = dump.put_back(storage, (line.decode() for line in lines))

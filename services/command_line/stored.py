@@ -138,7 +138,7 @@ def upgrade(
     config: Config = CONFIG,
 ) -> None:
     """Bring the tables up to date and make the views anew; with --to go back, before an older program is installed."""
-    from services.storage import open_storage, upkeep
+    from services.storage import open_storage, schema_version, upkeep
 
     address = _settings(load(config, ("persistence",))).address
     if to is not None:
@@ -146,7 +146,7 @@ def upgrade(
         return
     with closing(open_storage(address)) as storage:
         storage.remake_views()
-        _say(f"{address}: schema version {upkeep.version(storage)}, {len(storage.items)} items and their views")
+        _say(f"{address}: schema version {schema_version(storage)}, {len(storage.items)} items and their views")
 
 
 @db.command(epilog="Example: apartment db check")

@@ -23,7 +23,7 @@ from services.bus import Message
 from services.errors import BadMessage, ConfigError, Unavailable
 from services.history import answers, keeping
 from services.history.keeping import Keep
-from services.payloads.history import HistoryGet, HistoryReply
+from services.payloads.history import TOO_LONG, HistoryGet, HistoryReply
 from services.runner import Post
 from services.section import Section
 from services.storage import Storage, ahead, open_ready
@@ -152,7 +152,7 @@ class History:
             raise
         reply = topics.HISTORY_REPLY.message(self._reply(asked, now), id=asked.id)
         if len(reply.payload) > topics.TEXT_LIMIT:
-            reply = topics.HISTORY_REPLY.message(self._told(asked, "too long an answer: ask for less"), id=asked.id)
+            reply = topics.HISTORY_REPLY.message(self._told(asked, TOO_LONG), id=asked.id)
         yield reply
         if (also := topics.reply(reply, message)) is not None:
             yield also

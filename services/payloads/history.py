@@ -9,6 +9,8 @@ from pydantic import Field
 from services.payloads import Payload
 from services.payloads.robot import MissionResult
 
+TOO_LONG = "too long an answer: ask for less"  # the `error` of a reply that the bus would not carry
+
 
 class HistoryGet(Payload):
     """`history/get`: a question. Times are ISO 8601 with an offset; no `until` is now, no `since` is from ever.

@@ -95,18 +95,13 @@ def _checked(form: re.Pattern[str], text: str) -> str:
     return text
 
 
-def version(storage: Storage) -> int:
-    """The version of the schema that a database has."""
-    return int(storage.read("SELECT COALESCE(MAX(version), 0) FROM schema_version")[0][0])
-
-
 def take_back(address: Address, to: int) -> int:
     """From the newest version of the schema to an older one; the version before. The next to open it brings it up."""
     newest = max(versions(address.dialect))
     if not 1 <= to <= newest:
         raise ConfigError([f"expected a version from 1 to {newest}, got {to}"])
     with closing(open_storage(address)) as storage:
-        before = version(storage)
+        before = schema_version(storage)
         for number, script in list(back(address.dialect, before, to)):
             storage.change(*script, f"DELETE FROM schema_version WHERE version={number}")
     return before

@@ -12,7 +12,7 @@ from services.dashboard.house import House
 from services.dashboard.http.endpoint import Asked, Endpoint
 from services.errors import BadMessage
 from services.payloads import seconds, stamp
-from services.payloads.history import HistoryReply
+from services.payloads.history import TOO_LONG, HistoryReply
 from services.payloads.robot import MissionResult
 from services.states import base_type
 
@@ -23,7 +23,6 @@ EARLIEST = seconds("0001-01-01T00:00:00Z")  # there is no day before
 PIECE = 2000  # changes in one answer of the bus; of long texts fewer fit
 MOST_PIECES = 60  # of one item, and a look at 10,000 samples each: a year of one a minute
 MOST_STATES, MOST_LINES = 20_000, 100_000  # at once: for a page, in a table
-TOO_LONG = "too long an answer"  # what the history service says of one that does not fit
 NUMBERS = ("Number", "Dimmer", "Rollershutter")
 WIDTHS_S = (
     1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400,
@@ -101,7 +100,7 @@ async def _changes(
     end, piece = stamp(until), PIECE
     for _ in range(MOST_PIECES):
         reply = await house.ask(item=item, what="changes", since=stamp(since), until=end, limit=piece)
-        if TOO_LONG in (reply.error or "") and piece > 1:
+        if reply.error == TOO_LONG and piece > 1:
             piece //= 2
             continue
         begin = _good(reply).since
