@@ -25,7 +25,7 @@ from services.process import SIGNAL_S, SUPERVISED
 
 log = logging.getLogger(__name__)
 
-SETTLED_S = 3.0  # a service that lived so long starts again at once; one that crashes while starting waits
+SETTLED_S = 3.0  # a service that was ready and lived so long starts again at once; one that never gets so far waits
 BACKOFF_S = (0.2, 30.0)  # after a short life: first, longest; doubled each time
 KILLED_S = 1.0  # the longest for one that somebody killed: it is back within 3 s however often that happens
 READY_S = 60.0  # a small machine imports OpenCV for some seconds
@@ -153,7 +153,8 @@ class Supervisor:
 
     def _plan_restart(self, child: Child, code: int) -> None:
         now = time.monotonic()
-        child.failures = 0 if now - child.started > SETTLED_S else child.failures + 1
+        settled = child.ready is not None and now - child.started > SETTLED_S
+        child.failures = 0 if settled else child.failures + 1
         longest = KILLED_S if code < 0 else BACKOFF_S[1]
         pause = 0.0 if child.failures == 0 else min(BACKOFF_S[0] * 2 ** (child.failures - 1), longest)
         child.start_at, child.process = now + pause, None

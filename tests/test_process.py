@@ -11,12 +11,13 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
 from types import SimpleNamespace
 
 import pytest
 
 from services import peers, process
+from services import supervisor as supervisor_module
 from services.apartment.home import Home
 from services.config import Apartment, BusSettings, Instance
 from services.process import Clock
@@ -78,6 +79,22 @@ def test_a_service_is_started_again_though_a_process_of_its_own_holds_its_output
     finally:
         for pid in waiting:
             os.kill(pid, signal.SIGKILL)
+
+
+def test_a_service_that_takes_long_to_fail_while_it_starts_waits_longer_each_time(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(supervisor_module, "SETTLED_S", 0.0)  # as long as any start
+    supervisor = Supervisor({"one": [sys.executable, "-c", "raise SystemExit(2)"]})
+    runs = Thread(target=supervisor.run, args=(lambda _: None,))
+    runs.start()
+    try:
+        peers.wait_until(lambda: len(caplog.messages) >= 3, "three lives")
+    finally:
+        supervisor.stop()
+        runs.join()
+    told = [message.rpartition("again in ")[2] for message in caplog.messages[:3]]
+    assert told == ["0.2 s", "0.4 s", "0.8 s"]
 
 
 def test_a_state_folder_that_cannot_be_written_is_told_in_a_line(tmp_path: Path) -> None:

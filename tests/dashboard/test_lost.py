@@ -228,7 +228,11 @@ def test_a_connection_that_dies_without_a_word_is_noticed_and_made_again(alone: 
         shown.clock.install()
         view(shown, "devices")
         link, banner = shown.locator(".link"), shown.locator(".cut")
+        humidity = shown.locator("[data-item=Lab_Humidity] .value")
+        say(alone, "home/Lab_Humidity/state", "41.5")
+        expect(humidity).to_contain_text("41.5")
         way.cut()
+        say(alone, "home/Lab_Humidity/state", "")  # nobody tells this page that it was taken away
         shown.clock.fast_forward(SILENT_MS)
         expect(link).to_have_attribute("data-state", "connecting")
         expect(banner).to_contain_text("No connection to the dashboard. What is shown is of")
@@ -237,6 +241,7 @@ def test_a_connection_that_dies_without_a_word_is_noticed_and_made_again(alone: 
         expect(banner).to_be_empty()
         say(alone, "home/Bedroom_Temp/state", "19.5 °C")
         expect(shown.locator("[data-item=Bedroom_Temp] .value")).to_have_text("19.5 °C")
+        expect(humidity).to_have_text("–")
 
 
 def test_health_goes_on_for_whoever_reads_it_by_the_keyboard(alone: Running, shown: Page) -> None:
@@ -276,12 +281,19 @@ def test_a_state_that_nobody_knows_is_not_shown_as_off(alone: Running, shown: Pa
     items = ("Kitchen_Light", "Radio_Player", "Lamp_Color")
     view(shown, "devices")
     cards = {item: shown.locator(f"[data-item={item}]") for item in items}
+    dimmer = shown.locator("[data-item=Hall_Dimmer] input")
+    expect(dimmer).to_have_value("0")  # not in the middle, where browsers put one of which they know nothing
     for card in cards.values():
         expect(card.locator(".value")).to_have_text("–")  # nobody has said anything
     expect(shown.locator("[data-item=Bedroom_Mode] select")).to_have_value("")
     switch, play = cards["Kitchen_Light"].get_by_role("switch"), cards["Radio_Player"].locator("button").nth(1)
     off = {"Kitchen_Light": "OFF", "Radio_Player": "PAUSE", "Lamp_Color": "0,0,0"}
     for unknown in ("NULL", "UNDEF"):
+        say(alone, "home/Hall_Dimmer/state", "30")
+        expect(dimmer).to_have_value("30")
+        say(alone, "home/Hall_Dimmer/state", unknown)
+        expect(dimmer).to_have_value("0")
+        expect(dimmer).to_have_attribute("aria-label", "Hall light, state unknown")
         for item, card in cards.items():
             say(alone, f"home/{item}/state", unknown)
             expect(card.locator(".value")).to_have_text("–")

@@ -130,7 +130,8 @@ function connect() {
   hear("snapshot", (event) => {
     ahead = event.lastEventId - heard;
     forget();
-    take(JSON.parse(event.data), false);
+    const rows = JSON.parse(event.data);
+    take([...takenAway(rows), ...rows], false);
     tell("live");
   });
   hear("beat", (event) => { ahead = Math.max(ahead, event.lastEventId - heard); }); // the quickest is nearest to the truth
@@ -152,6 +153,12 @@ function look() {
 function forget() {
   const heard = wanted.map(matcher);
   for (const topic of latest.keys()) if (!heard.some((matches) => matches(topic))) latest.delete(topic);
+}
+
+/** Of the states that we know those that a snapshot has not any more: they went while we did not listen. */
+function takenAway(rows) {
+  const there = new Set(rows.map(([topic]) => topic));
+  return [...latest.values()].filter(({ topic, kind }) => kind === "s" && !there.has(topic)).map(({ topic }) => [topic, "", now(), "s"]);
 }
 
 async function comeBack() {

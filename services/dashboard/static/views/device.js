@@ -119,17 +119,15 @@ function toggle(item, send) {
 function slider(item, send) {
   const { min, max, step } = { min: 0, max: 100, step: 1, ...(item.range ?? {}) };
   let held = false;
-  const element = h("input", { type: "range", min, max, step: step ?? 1, "aria-label": item.label,
-    oninput: () => { held = true; paint(); },
+  const element = h("input", { type: "range", min, max, step: step ?? 1, value: min, "aria-label": item.label,
+    oninput: () => { held = true; },
     onchange: () => {
       held = false;
       const wanted = element.value;
       send(wanted, (state) => Math.abs(number(state) - number(wanted)) < 0.5);
     } });
-  const paint = () => element.style.setProperty("--share", `${((element.value - min) / (max - min)) * 100}%`);
-  return { element, show(state) {
-    if (!held && !Number.isNaN(number(state))) element.value = number(state);
-    paint();
+  return { element, known: naming(element), show(state) {
+    if (!held) element.value = Number.isNaN(number(state)) ? min : number(state);
   } };
 }
 
