@@ -18,6 +18,7 @@ READ_DEG = 0.08  # the resolution, and a little dither
 COARSE = 0.3  # of a step of its reading: standard deviation
 MOVED_DEG = 0.3  # no reading at rest changes as much
 CLEAR_DEG = 2.0  # so far the wrong way is not a doubtful reading
+FASTER = 3.0  # than is known a motor may be
 FOREVER = 1e12
 TIME_S = 0.01  # what is left of the timing of a command or a reading when all that is learnt is taken off
 
@@ -44,6 +45,14 @@ class Course:
             if level != self.levels[axis]:
                 self.told[axis].append(Told(reply.received, late, level))
                 self.levels[axis] = level
+
+    def stop_again(self, reply: Reply) -> None:
+        """The stop before had no effect: what it was to end went on until this one."""
+        last = max((told[-1].at for told in self.told if told and not told[-1].level), default=0.0)
+        for axis, told in enumerate(self.told):
+            if told and not told[-1].level and told[-1].at == last:
+                told[-1] = Told(reply.received, self.skill.timing.late(reply), 0)
+                self.shift[axis] = 0.0
 
     def at(self, axis: int, when: float) -> float:
         """Where an axis is at a time."""
@@ -155,12 +164,21 @@ class Course:
                 self.flip(axis)
 
     def _doubt_sense(self, axis: int, reply: Reply, late: float, value: float) -> None:
-        """An axis that has clearly gone the other way all the time: which way it turns was wrong, or changed."""
-        pace, told = self.skill.paces[axis], self.told[axis]
-        ways = {one.level > 0 for one in told if one.level}
+        """An axis that goes clearly the other way: which way it turns was wrong, or changed.
+
+        Also one that stays where it is at an end of its way, though it should have left that. Not one that turns the
+        right way since the last look, or is farther off at the first than it can have come: a stop before had no
+        effect, and it has come from elsewhere.
+        """
+        pace, told, before = self.skill.paces[axis], self.told[axis], self._read[axis]
         expected = pace.travel(told, pace.seen_at(reply.sent, late))
         moved = value - self.origin[axis]
-        if len(ways) == 1 and expected * moved < 0 and min(abs(expected), abs(moved)) > CLEAR_DEG:
+        if len({one.level > 0 for one in told if one.level}) != 1 or abs(expected) <= CLEAR_DEG:
+            return
+        low, high = self.limits.ranges[axis]
+        held = abs(moved) < MOVED_DEG and (value < low + END if expected > 0 else value > high - END)
+        way = abs(moved) < FASTER * abs(expected) if before is None else (moved - before.travel) * expected <= 0
+        if held or (expected * moved < 0 and abs(moved) > CLEAR_DEG and way):
             self.flip(axis)
 
     def flip(self, axis: int) -> None:

@@ -19,7 +19,8 @@ from services.camera.ptz.stand import stop as until_confirmed
 NEAR_LEVELS = 0.5
 END_LEVELS = 0.3  # zoom ends so far from the ends of its range
 ODD_DEG = 0.4  # a reading farther from what was reckoned may not be of a camera at rest
-LATE_DOUBT_S = 0.15  # the age of readings is not known well: two equal ones, then
+STRAY_DEG = 2.0  # a reading farther from that, of a camera that says it moves, is none of the last bit of its way
+LATE_DOUBT_S = 0.15  # with more doubt about the age of readings, two equal ones
 LONGEST_DOUBT_S = 0.35
 PAIR_S = 0.25  # between two readings that are compared
 UNSURE_LEVELS = 0.1  # it is not said to stand at the very end, which it may just have missed
@@ -106,21 +107,20 @@ class Helm:
 
     def rest(self, now: float) -> Plan[tuple[Reading, float]]:
         """The reading of pan and tilt at rest, and of zoom when it does not turn."""
-        pace = self.skill.paces[PAN]
         now = yield from wait(max(now, self.settled()))
-        self.rests = self.course.rests_at()
+        self.rests, known = self.course.rests_at(), self.skill.motors()
         reply, seen, reading = yield from self._look()
         since, unlike = reply.sent, 0
-        while reading is None or (
-            self.zoom_ends is None and (pace.other_doubt(READ_LATE) > LATE_DOUBT_S or self._odd(reading))
-        ):
+        while reading is None or (self.zoom_ends is None and (self._late_doubted() or self._odd(reading))):
             yield from wait(reply.sent + PAIR_S)
             before = seen
             reply, seen, reading = yield from self._look()
             if not same(before, seen):
                 since, unlike = reply.sent, unlike + 1
-                if unlike % LOST == 0:  # the stop had no effect
-                    yield from until_confirmed(reply.received, every=unlike > LOST)
+                if unlike % LOST == 0:  # the stop had no effect, and what was read since teaches nothing
+                    again = yield from until_confirmed(reply.received, every=unlike > LOST)
+                    self.skill.forget(known)
+                    self.course.stop_again(again)
             if reply.sent >= since + PAIR_S and self.zoom_ends is None:
                 self.skill.always_moving = seen.moving is True
                 reading = seen
@@ -137,7 +137,7 @@ class Helm:
         """A look where it should rest: the answer, its reading, and that of the rest; None: not known by this one."""
         reply = yield from self.send(Status())
         seen = cast(Reading, reply.result)
-        rest = self._resting(reply, seen)
+        rest = None if self._runs_on(seen) else self._resting(reply, seen)
         self._weigh(rest or seen)
         self._see_still(rest or seen)
         self.course.read(reply, seen)
@@ -204,14 +204,22 @@ class Helm:
         told, pace = self.course.told[axis], self.skill.paces[axis]
         return max((pace.rate(abs(one.level)) for one in told if one.level), default=0.0)
 
+    def _runs_on(self, seen: Reading) -> bool:
+        """Whether it says that it moves, and is far from where it should rest: the stop may have had no effect."""
+        return self._moves(seen) and self.zoom_ends is None and self._off(seen) > STRAY_DEG
+
+    def _late_doubted(self) -> bool:
+        """Whether the age of readings is not known well."""
+        return self.skill.paces[PAN].other_doubt(READ_LATE) > LATE_DOUBT_S
+
     def _odd(self, reading: Reading) -> bool:
         """Whether a reading at rest is not what was reckoned: it may not be at rest."""
-        pose = self.limits.pose(reading)
-        return any(
-            abs(pose[axis] - self.course.stopped(axis, FOREVER)) > ODD_DEG
-            for axis in (PAN, TILT)
-            if self.course.told[axis]
-        )
+        return self._off(reading) > ODD_DEG
+
+    def _off(self, reading: Reading) -> float:
+        """How far a reading is from where it should rest, degrees."""
+        pose, turned = self.limits.pose(reading), [axis for axis in (PAN, TILT) if self.course.told[axis]]
+        return max((abs(pose[axis] - self.course.stopped(axis, FOREVER)) for axis in turned), default=0.0)
 
     def _moves(self, reading: Reading) -> bool:
         """Whether the camera says that it moves; some firmware says so for ever."""

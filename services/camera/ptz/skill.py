@@ -6,6 +6,7 @@ Not here: how an axis learns (`pace.py`), where this is kept over a restart (`ke
 from __future__ import annotations
 
 from collections import deque
+from copy import deepcopy
 from dataclasses import dataclass, field
 from math import hypot
 from statistics import median
@@ -102,6 +103,9 @@ class Timing:
         return max(TAIL_S, TAIL_PART * self.usual, WORSE * self.worst, self.spread)
 
 
+Motors = tuple[tuple[Pace, Pace, Pace], tuple[Pace, Pace, Pace], Timing, float]
+
+
 @dataclass
 class Skill:
     """What is learnt about one camera. `zoomed` is where zoom truly is, as far as its coarse reading leaves open."""
@@ -127,6 +131,14 @@ class Skill:
     beside: dict[str, tuple[float, float]] = field(default_factory=dict)  # by form: pan and tilt off what was asked
     presets: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # readings where each was seen to be
     scales: dict[RelativeForm, Scale] = field(default_factory=_scales)
+
+    def motors(self) -> Motors:
+        """What is known of the motors and the answers by now, for `forget`."""
+        return deepcopy((self.paces, self.drives, self.timing, self.surprise))
+
+    def forget(self, known: Motors) -> None:
+        """What was learnt of them since was wrong."""
+        self.paces, self.drives, self.timing, self.surprise = deepcopy(known)
 
     def timed(self, seconds: float) -> None:
         """An answer took so long; what is usual may change with it, and what was learnt against that stays as true."""

@@ -71,6 +71,31 @@ def test_a_reading_on_the_way_tells_where_it_is_however_little_was_known_of_the_
 
 
 @pytest.mark.parametrize(
+    ("here", "reads", "turned"),
+    [
+        pytest.param(100.0, [96.0, 92.0], False, id="it goes as it should"),
+        pytest.param(100.0, [104.0, 108.0], True, id="it goes the other way"),
+        pytest.param(100.0, [121.0, 117.0], False, id="it was farther, for a stop had no effect, and comes back"),
+        pytest.param(100.0, [100.0, 100.0], False, id="it stands, as if the start had had no effect"),
+        pytest.param(179.0, [179.0, 179.0], True, id="it stands at an end of its way, and should have left that"),
+        pytest.param(179.0, [175.0, 171.0], False, id="it leaves that"),
+    ],
+)
+def test_which_way_an_axis_turns_is_doubted_only_where_it_surely_goes_the_other_way(
+    here: float, reads: list[float], turned: bool
+) -> None:
+    skill = Skill()
+    skill.senses[PAN].sure, before = True, skill.senses[PAN].sign
+    course = Course(LIMITS, skill, (here, 20.0, 0.0))
+    course.tell(Reply(Start(Direction.LEFT, 3), 1, None, None, 999.7, 1000.0), (-2, 0, 0))  # 3 degrees/s
+    for number, pan in enumerate(reads):
+        seen = Reading(pan, 20.0, 0.0)
+        asked = 1001.3 + 1.3 * number
+        course.read(Reply(Status(), 2 + number, seen, None, asked, asked + 0.3), seen)
+    assert (skill.senses[PAN].sign != before) == turned
+
+
+@pytest.mark.parametrize(
     ("rate", "begun", "turn", "reading", "becomes"),
     [
         (1.0, 8.0, Direction.ZOOM_OUT, 4.0, "more"),
