@@ -132,6 +132,14 @@ class Rig:
             error=str(run.error) if run.error else None,
         )
 
+    def visit(self, goals: Iterable[Goal]) -> list[Outcome]:
+        """All goals one after the other, some time between two."""
+        found = []
+        for goal in goals:
+            found.append(self.go(goal))
+            self.now += 1.0
+        return found
+
     def calibrate(self) -> None:
         """What the order for it does, before any goal."""
         run = self.drive(calibrate(LIMITS, self.skill), limit_s=1500.0)
@@ -222,14 +230,11 @@ def with_other_motors(profile: Profile, seed: int) -> Profile:
 def outcomes(
     profile: Profile, goals: Iterable[Goal], seed: int = 1, *, calibrated: bool = False, network_s: float = 0.0
 ) -> list[Outcome]:
-    """All goals one after the other, some time between two: from a cold start, or after `apartment calibrate ptz`."""
-    rig, found = Rig(profile, seed, network_s=network_s), []
+    """All goals one after the other: from a cold start, or after `apartment calibrate ptz`."""
+    rig = Rig(profile, seed, network_s=network_s)
     if calibrated:
         rig.calibrate()
-    for goal in goals:
-        found.append(rig.go(goal))
-        rig.now += 1.0
-    return found
+    return rig.visit(goals)
 
 
 def with_presets(profile: Profile, goals: Iterable[Goal], seed: int, beside: float) -> list[Outcome]:

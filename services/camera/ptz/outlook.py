@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import exp, inf, log, sqrt
+from typing import NamedTuple
 
 from services.camera.ptz.pace import Pace, Rates
 from services.camera.ptz.skill import DITHER_DEG, Skill
@@ -50,6 +51,16 @@ class Way:
         return Rates(self.pace)
 
 
+class First(NamedTuple):
+    """A leg that may come first: it ends so far short of the goal, after so long, and is looked at so often."""
+
+    speed: int
+    short: float
+    held: float
+    looks: int
+    hopeless: bool  # it may not turn at all
+
+
 @dataclass
 class Outlook:
     """The same for every leg that is thought about at one time."""
@@ -57,6 +68,7 @@ class Outlook:
     ways: dict[int, Way]
     skill: Skill
     known: dict[tuple[int, int, int], float] = field(default_factory=dict)
+    firsts: dict[tuple[int, int, bool, bool], list[First]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         every = [way.rates for way in self.ways.values()]
@@ -97,18 +109,27 @@ class Outlook:
         key = (axis, step, left)
         if key not in self.known:
             self.known[key] = NEVER_S  # until it is known better
-            self.known[key] = min(
-                self._leg(axis, exp(step / FINE), speed, left) for speed in self.ways[axis].rates.speeds
-            )
+            self.known[key] = min(self._follows(axis, first, left) for first in self._firsts(axis, step, left))
         return self.known[key]
 
-    def _leg(self, axis: int, distance: float, speed: int, left: int) -> float:
-        way = self.ways[axis]
-        short = self.short(axis, speed, distance, left)
-        if short >= distance and speed > 1:
+    def _firsts(self, axis: int, step: int, left: int) -> list[First]:
+        """Each speed to begin with: it is the same for many numbers of commands."""
+        key = (axis, step, left <= LAST, left <= LEG)
+        if key not in self.firsts:
+            rates, distance, found = self.ways[axis].rates, exp(step / FINE), []
+            for speed in rates.speeds:
+                short = self.short(axis, speed, distance, left)
+                held = max(self.skill.timing.usual, held_for(rates, speed, distance - short))
+                hopeless = short >= distance and speed > 1
+                found.append(First(speed, short, held, looks_in(held, known=rates.known(speed)), hopeless))
+            self.firsts[key] = found
+        return self.firsts[key]
+
+    def _follows(self, axis: int, first: First, left: int) -> float:
+        speed, short, held, looks, hopeless = first
+        if hopeless:
             return NEVER_S
-        held = max(self.skill.timing.usual, held_for(way.rates, speed, distance - short))
-        looks = looks_in(held, known=way.rates.known(speed))
+        way = self.ways[axis]
         held += OVER_S * max(0, LEG + looks - max(0, left))
         left -= looks
         if short > way.near:
