@@ -35,6 +35,7 @@ def camera() -> Iterator[simulated.Simulated]:
 def here(tmp_path: Path, camera: simulated.Simulated) -> Iterator[Bench]:
     with bench(tmp_path, camera, **QUICK) as running:
         running.until(lambda: running.service.motion.fact == "attached" and motion(running) == 0, 10)
+        running.until(lambda: watched(running), 60)
         yield running
 
 

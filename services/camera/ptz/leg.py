@@ -60,8 +60,13 @@ class Leg:
 def choose(ways: dict[int, Way], skill: Skill, *, left: int = 12, runs: dict[int, int] | None = None) -> Leg:
     """The leg that probably costs least; `left` commands until it is read to be there; `runs`: what needs no start."""
     outlook, left = Outlook(ways, skill), max(0, left)  # what is spent is spent
-    legs = [leg for pair in _speeds(ways) for leg in _legs(outlook, pair, left)]
-    return min((_judged(leg, outlook, left, runs or {}) for leg in legs), key=lambda leg: leg.cost)
+    legs = sorted((leg for pair in _speeds(ways) for leg in _legs(outlook, pair, left)), key=lambda leg: leg.held)
+    best = _judged(legs[0], outlook, left, runs or {})
+    for leg in legs[1:]:
+        if leg.held - COMMAND_S > best.cost:
+            break  # this one and those behind it take longer than the best of all costs
+        best = min(best, _judged(leg, outlook, left, runs or {}), key=lambda leg: leg.cost)
+    return best
 
 
 def _speeds(ways: dict[int, Way]) -> Iterator[dict[int, int]]:

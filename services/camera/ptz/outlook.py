@@ -58,7 +58,6 @@ class First(NamedTuple):
     short: float
     held: float
     looks: int
-    hopeless: bool  # it may not turn at all
 
 
 @dataclass
@@ -109,25 +108,31 @@ class Outlook:
         key = (axis, step, left)
         if key not in self.known:
             self.known[key] = NEVER_S  # until it is known better
-            self.known[key] = min(self._follows(axis, first, left) for first in self._firsts(axis, step, left))
+            best = inf
+            for first in self._firsts(axis, step, left):
+                if min(first.held, NEVER_S) >= best:
+                    break
+                best = min(best, self._follows(axis, first, left))
+            self.known[key] = best
         return self.known[key]
 
     def _firsts(self, axis: int, step: int, left: int) -> list[First]:
-        """Each speed to begin with: it is the same for many numbers of commands."""
+        """What to begin with, the quickest first: it is the same for many numbers of commands."""
         key = (axis, step, left <= LAST, left <= LEG)
         if key not in self.firsts:
             rates, distance, found = self.ways[axis].rates, exp(step / FINE), []
             for speed in rates.speeds:
                 short = self.short(axis, speed, distance, left)
                 held = max(self.skill.timing.usual, held_for(rates, speed, distance - short))
-                hopeless = short >= distance and speed > 1
-                found.append(First(speed, short, held, looks_in(held, known=rates.known(speed)), hopeless))
-            self.firsts[key] = found
+                looks = looks_in(held, known=rates.known(speed))
+                hopeless = short >= distance and speed > 1  # it may not turn at all
+                found.append(First(speed, short, inf if hopeless else held, looks))
+            self.firsts[key] = sorted(found, key=lambda first: first.held)
         return self.firsts[key]
 
     def _follows(self, axis: int, first: First, left: int) -> float:
-        speed, short, held, looks, hopeless = first
-        if hopeless:
+        speed, short, held, looks = first
+        if held == inf:
             return NEVER_S
         way = self.ways[axis]
         held += OVER_S * max(0, LEG + looks - max(0, left))
