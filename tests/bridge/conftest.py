@@ -19,7 +19,7 @@ from services import peers
 from services.peers import ros
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_S = 60.0  # for things that take some seconds on a quiet machine, and a dozen times that on a busy one
+PATIENCE_S = 30.0  # for things that take a second on a quiet machine
 
 
 class BridgeProcess:

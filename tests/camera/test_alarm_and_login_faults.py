@@ -93,7 +93,8 @@ def test_after_a_password_change_three_logins_fail_at_most_over_everything_toget
         simulator(latency_s=0.02, switches=switches) as camera,
         bench(tmp_path, camera, motion={"heartbeat_s": 1}) as here,
     ):
-        here.until(lambda: here.service.motion.fact == "attached" and watched(here), 60)
+        here.until(lambda: here.service.motion.fact == "attached", 10)
+        here.until(lambda: watched(here), 60)
         refused = door(here)["stale"]
         for number in range(200 if switches else 0):
             here.order("Flip", "True", str(number))
