@@ -93,7 +93,7 @@ class Rtsp:
         except StopIteration:
             raise Away("the camera has ended the stream") from None
         except av.FFmpegError as error:
-            raise _translated(error) from None
+            raise _translated(error, "broke off") from None
         if packet.size == 0:  # PyAV's sign of the end
             raise Away("the camera has ended the stream")
         return packet
@@ -136,14 +136,14 @@ def _open(url: str) -> av.container.InputContainer:
     try:
         container = av.open(url, options=OPTIONS, timeout=(OPEN_S, READ_S))
     except av.FFmpegError as error:
-        raise _translated(error) from None
+        raise _translated(error, "cannot be opened") from None
     if not container.streams.video:
         container.close()
         raise Refused("the camera's stream has no picture")
     return container
 
 
-def _translated(error: av.FFmpegError) -> DeviceError:
+def _translated(error: av.FFmpegError, otherwise: str) -> DeviceError:
     """Never the error's own text: the address stands in it."""
     if isinstance(error, av.HTTPUnauthorizedError):
         return BadLogin("the camera's stream does not know this user and password", 0.0)  # the reader knows how long
@@ -151,7 +151,7 @@ def _translated(error: av.FFmpegError) -> DeviceError:
         return Refused(f"the camera refuses the stream: {error.strerror}")
     if isinstance(error, av.ExitError):
         return Away(f"no picture within {READ_S:.0f} s")
-    return Away(f"the stream broke off: {error.strerror}")
+    return Away(f"the stream {otherwise}: {error.strerror}")
 
 
 def _developer(frame: av.VideoFrame) -> Callable[[], Image]:

@@ -48,7 +48,7 @@ class Light:
         self.going, self.late = True, 0.0
         self.waiting: deque[tuple[float, bytes]] = deque()
         self.source: Any = None
-        self.began = 0.0
+        self.began = 0.0  # when the pipeline's own time began, seconds since 1970
         self.number = 0
 
     def configure(self, factory: Any, media: Any) -> None:
@@ -59,15 +59,21 @@ class Light:
     def tick(self) -> bool:
         """Exposes a picture, and sends those whose time has come."""
         now = time.time()
-        if self.going and self.source is not None:
+        if self.going and self.source is not None and self.runs(now):
             self.number += 1
             self.waiting.append((now, picture(now, self.number)))
             while self.waiting and self.waiting[0][0] + self.late <= now:
                 self.send(*self.waiting.popleft())
         return True
 
+    def runs(self, now: float) -> bool:
+        """Whether the pipeline does. It holds a picture until its own time: one of before would delay all others."""
+        running = self.source.get_current_running_time()
+        if not self.began and running != Gst.CLOCK_TIME_NONE:
+            self.began = now - running / Gst.SECOND
+        return bool(self.began)
+
     def send(self, at: float, data: bytes) -> None:
-        self.began = self.began or at
         buffer = Gst.Buffer.new_wrapped(data)
         buffer.pts = int((at - self.began) * Gst.SECOND)
         buffer.duration = Gst.SECOND // FPS

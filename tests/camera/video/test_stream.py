@@ -167,7 +167,7 @@ def test_without_rtsp_snapshots_are_handed_on(tmp_path: Path, camera: simulated.
         assert here.end_of("1", 20)["state"] == "done"
         image = turning(here, lambda: first_picture(stream(here)["url"]))
         assert image.shape == (1296, 2304, 3)
-        here.until(lambda: "stream broke off" in diagnostic(here)["message"], 10)
+        here.until(lambda: "stream cannot be opened: " in diagnostic(here)["message"], 10)
         assert diagnostic(here)["values"]["stream"] == "snapshots"
         assert diagnostic(here)["level"] == 1
 

@@ -102,7 +102,7 @@ function controlOf(item, send) {
   return made ? made(item, send) : null;
 }
 
-/** What tells in a control's label whether its state is known; those whose value stands beside them need none. */
+/** What adds to a control's label that its state is unknown; controls whose value stands beside them need none. */
 function naming(element) {
   const label = element.getAttribute("aria-label");
   return (known) => element.setAttribute("aria-label", known ? label : `${label}${UNKNOWN}`);
