@@ -1,6 +1,6 @@
 """Random goals on every firmware that the simulator has, in virtual time, against the bounds.
 
-Fifty goals from a cold start, and that eight times: with one seed alone a median may be a tenth off, with three a
+Fifty goals from a cold start, and that five times: with one seed alone a median may be a tenth off, with three a
 twentieth.
 """
 
@@ -15,7 +15,7 @@ from services.simulators.camera.motors import Pose
 from tests import bounds
 from tests.camera.goals import Outcome, Rig, outcomes, random_goals, wanted, with_presets
 
-SEEDS = range(1, 9)
+SEEDS = range(1, 6)
 BESIDE_DEG = 3.0
 
 
@@ -57,8 +57,7 @@ def test_a_calibrated_camera_takes_few_commands_from_its_first_goal_on(name: str
         for one in outcomes(PROFILES[name], random_goals(bounds.GOALS, seed), seed, calibrated=True)
     ]
     assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
-    first = [one.commands for one in found[:: bounds.GOALS]]
-    assert sum(commands > bounds.COMMANDS for commands in first) <= 1
+    assert max(one.commands for one in found[:: bounds.GOALS]) <= bounds.COMMANDS  # the first ones
     assert max(one.commands for one in found) <= bounds.COMMANDS + bounds.CORRECTION
     few = [one.commands <= bounds.COMMANDS for one in found]
     assert sum(few) >= bounds.CALIBRATED_WITHIN_COMMANDS * len(few)
