@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-AGAIN_S = 5.0  # after it ended, until it is started again
+AGAIN_S = 5.0  # at least, from one start to the next
 GRACE_S = 3.0
 
 log = logging.getLogger(__name__)
@@ -37,13 +37,15 @@ class Child:
         return self._process is not None
 
     def tend(self, now: float) -> bool:
-        """Starts it where it does not run, a while after it ended; True when it has just been started."""
+        """Starts it where it does not run, at once if it ran for a while; True when it has just been started."""
         if self._process is not None and not self._process.is_alive():
-            log.error("the process for %s ended with %s; again in %.0f s", self._name, self._process.exitcode, AGAIN_S)
+            self._start_at = min(self._start_at, now + AGAIN_S)  # however the clock was set since
+            wait = max(0.0, self._start_at - now)
+            log.error("the process for %s ended with %s; again in %.0f s", self._name, self._process.exitcode, wait)
             self._forget()
-            self._start_at = now + AGAIN_S
         if self._process is not None or now < self._start_at:
             return False
+        self._start_at = now + AGAIN_S
         self._start()
         return True
 
