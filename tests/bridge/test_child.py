@@ -6,6 +6,7 @@ import multiprocessing
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from services.bridge.child import AGAIN_S, Child
 from services.peers import wait_until
 
-NOON = 1_768_000_000.0
+NAME, NOON = "trials", 1_768_000_000.0
 
 
 def stays(wanted: Any, connection: Connection, every_s: float) -> None:
@@ -26,7 +27,7 @@ def ends(wanted: Any, connection: Connection, every_s: float) -> None:
 
 
 def started(target: Callable[[Any, Connection, float], None]) -> Iterator[Child]:
-    with closing(Child("trials", target, None, 1.0)) as child:
+    with closing(Child(NAME, target, None, 1.0)) as child:
         assert child.tend(NOON)
         yield child
 
@@ -41,13 +42,17 @@ def broken() -> Iterator[Child]:
     yield from started(ends)
 
 
+def running() -> list[BaseProcess]:
+    """Those of these tests alone; the test's own process may have others."""
+    return [process for process in multiprocessing.active_children() if process.name == NAME]
+
+
 def ended() -> None:
-    """`active_children` forgets those that have ended."""
-    wait_until(lambda: not multiprocessing.active_children(), "the end of the process")
+    wait_until(lambda: not running(), "the end of the process")
 
 
 def killed() -> None:
-    for process in multiprocessing.active_children():
+    for process in running():
         process.kill()
     ended()
 
