@@ -40,9 +40,11 @@ class Client:
         self._came = list(came)
         self._filters = list(filters)
         self._clock = clock
+        self._forgotten = 0  # the connection whose kept messages are old news
 
     def subscribe(self, *filters: str) -> None:
         """Asks for everything that matches any of the filters."""
+        self._forgotten = 0
         self._filters.extend(filters)
         self.bus.subscribe(filters)
 
@@ -58,6 +60,8 @@ class Client:
         """What has come since the last call; waits for the first up to `timeout_s`."""
         came, self._came = self._came or self.bus.receive(timeout_s), []
         self.bus.ack(came)
+        if self._forgotten == self.bus.connections:
+            came = [message for message in came if not message.retain]
         self.seen.extend(came)
         return came
 
@@ -90,9 +94,13 @@ class Client:
         return read(found := self.until(fits, timeout_s, topic), found.received).payload
 
     def forget(self) -> None:
-        """Forgets what came: the next wait is for new messages only."""
+        """Forgets what came: the next wait is for new messages only.
+
+        What the broker had kept when this was connected is none, even if it is still on its way.
+        """
         self.pump()
         self.seen.clear()
+        self._forgotten = self.bus.connections
 
     def order(
         self,

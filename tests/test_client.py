@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,27 @@ def test_what_comes_before_it_is_known_to_be_connected_is_given_by_the_first_pum
     with connected(settings, ["home/#"]) as late:
         assert [message.topic for message in _pumped(late)] == [STATE.topic]
         assert [message.topic for message in late.seen] == [STATE.topic]
+
+
+@pytest.mark.mosquitto
+def test_what_was_kept_and_is_still_on_its_way_is_forgotten_until_the_broker_is_back(tmp_path: Path) -> None:
+    with ExitStack() as clients:
+        with mosquitto.private(tmp_path, anonymous=True) as broker:
+            settings = BusSettings(port=broker.port)
+            speaker = clients.enter_context(connected(settings, ["home/Item2999/state"]))
+            for number in range(3000):  # more than one turn takes
+                speaker.say(f"home/Item{number}/state", "old", retain=True)
+            speaker.until(lambda message: message.payload == b"old")
+            late = clients.enter_context(connected(settings, ["home/#"]))
+            late.forget()
+            speaker.say("home/Item0/state", "new", retain=True)
+            late.until(lambda message: message.payload == b"new")
+            assert [message.payload for message in late.seen] == [b"new"]
+            late.subscribe("home/Item1/+")
+            late.until(lambda message: message.topic == "home/Item1/state")
+            late.forget()
+        with mosquitto.private(tmp_path, port=broker.port, anonymous=True):
+            late.until(lambda message: message.topic == "home/Item2/state", 30.0)
 
 
 @pytest.mark.mosquitto
