@@ -33,6 +33,7 @@ class SpeakingCamera(ThreadingHTTPServer):
         self.tone, self.content_type = g711.encode(wav.to_samples(sound)), content_type
         self.lasts_s: float | None = None  # the microphone's answer ends after so much sound
         self.refuses = False
+        self.odd: list[float] = []  # a POST of these is answered 401 after so many seconds, although its login is right
         self.heard: list[bytes] = []
         self.took_s: list[float] = []
         self.heads: list[dict[str, str]] = []
@@ -74,11 +75,20 @@ class Visit(BaseHTTPRequestHandler):
         if self.server.refuses:
             self.wfile.write(b"HTTP/1.1 400 Bad Request\r\nContent-Length: 20\r\n\r\nError\r\nBad Request!\r\n")
             return
+        if self.server.odd:
+            self.doubt(self.server.odd.pop(0))
+            return
         began, got = time.monotonic(), b""
         while piece := self.rfile.read1(4096):
             got += piece
         self.server.took_s.append(time.monotonic() - began)
         self.server.heard.append(got)
+
+    def doubt(self, after_s: float) -> None:
+        time.sleep(after_s)
+        self.wfile.write(b"HTTP/1.1 401 Unauthorized\r\nContent-Length: 0\r\n\r\n")
+        while self.rfile.read1(4096):
+            pass
 
     def let_in(self) -> bool:
         verdict = self.server.door.judge(self.command, self.path, self.headers.get("Authorization"), time.time())

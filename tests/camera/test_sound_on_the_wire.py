@@ -135,6 +135,23 @@ def test_what_is_played_arrives_whole_and_in_time(tmp_path: Path, profile: str, 
     assert camera.door.counters["wrong"] == 0
 
 
+@pytest.mark.parametrize("after_s", [0.0, 0.6, 1.4])  # at once, while it is sent, and when it is over
+def test_an_odd_refusal_of_the_login_is_tried_again_once(
+    tmp_path: Path, camera: SpeakingCamera, room: Room, after_s: float
+) -> None:
+    (tmp_path / "one.wav").write_bytes(wav.write(wav.to_samples(melody(1.2, 8000))))
+    camera.odd = [after_s]
+    assert room.ask(Play(tmp_path / "one.wav")).error is None
+    assert [len(heard) for heard in camera.heard] == [9600]
+    camera.odd = [after_s, after_s]
+    error = room.ask(Play(tmp_path / "one.wav")).error
+    assert isinstance(error, Away)
+    assert "401" in str(error)
+    assert len(camera.heard) == 1
+    assert room.gate.book.ever == 3
+    assert camera.door.counters["wrong"] == 0
+
+
 def test_the_post_is_as_cameras_want_it(tmp_path: Path, camera: SpeakingCamera, room: Room) -> None:
     (tmp_path / "one.wav").write_bytes(wav.write(wav.to_samples(melody(0.1, 8000))))
     room.ask(Play(tmp_path / "one.wav"))

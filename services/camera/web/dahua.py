@@ -77,18 +77,26 @@ class DahuaSound:
         raise Away(f"the camera ended its sound after {len(data) / g711.RATE:.1f} s")
 
     def play(self, data: bytes, ended: threading.Event) -> None:
-        """See `Sound`. A small request first shows that the login is right; another gets a nonce that is new."""
-        login = Login(self._address.user, self._address.password, self._gate)
-        small = system.magic("getDeviceType")
+        """See `Sound`. A login that is refused although it was right just before is tried once again, as elsewhere."""
         head = {"Content-Type": "Audio/G.711A", "Connection": "close"}
-        with connection(self._address, login) as http:
+        for _ in range(2):
+            signed = head | self._authorization()
+            if upload(self._address.url, signed, SEND, data, g711.RATE, self._gate, ended):
+                return
+            self._gate.rest()
+        raise Away("the camera answers 401 to the sound")
+
+    def _authorization(self) -> dict[str, str]:
+        """The header to send. A small request first shows that the login is right; another gets a nonce that is new."""
+        user, password = self._address.user, self._address.password
+        small = system.magic("getDeviceType")
+        with connection(self._address, Login(user, password, self._gate)) as http:
             replies.check(fetch(http, small))
             challenges = _bare(http, small).headers.get_list("www-authenticate")
-        if (challenge := read_challenge(challenges)) is not None:
-            secret = self._address.password.get_secret_value()
-            user, cnonce = self._address.user, secrets.token_hex(8)
-            head["Authorization"] = header(challenge, user, secret, "POST", SEND, cnonce)
-        upload(self._address.url, head, SEND, data, g711.RATE, self._gate, ended)
+        if (challenge := read_challenge(challenges)) is None:
+            return {}
+        secret, cnonce = password.get_secret_value(), secrets.token_hex(8)
+        return {"Authorization": header(challenge, user, secret, "POST", SEND, cnonce)}
 
 
 def _must_be_endless(response: httpx.Response) -> None:

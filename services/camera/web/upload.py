@@ -27,8 +27,11 @@ FAREWELL_S = 1.0  # until a camera that answers at the end has done so
 
 def upload(
     url: str, head: dict[str, str], target: str, data: bytes, rate: float, gate: Gate, ended: threading.Event
-) -> None:
-    """Sends `rate` bytes a second to the end, or until `ended` is set; DeviceError when the camera does not take it."""
+) -> bool:
+    """Sends `rate` bytes a second to the end, or until `ended` is set; whether the camera knew the login.
+
+    DeviceError when it does not take the sound.
+    """
     try:
         connection = _connection(url)
         try:
@@ -37,11 +40,11 @@ def upload(
                 for name, value in {**head, "Content-Length": str(LENGTH)}.items():
                     connection.putheader(name, value)
                 connection.endheaders()
-                if _answer(connection.sock, LOOK_S).startswith(b"401"):
-                    login.failed()
-                    raise Away("the camera answered 401 to the sound")
-            _stream(connection.sock, data, rate, ended)
-            _leave(connection.sock)
+                known = _known(connection.sock, LOOK_S)
+            known = known and _stream(connection.sock, data, rate, ended) and _leave(connection.sock)
+            if not known:
+                login.failed()
+            return known
         finally:
             connection.close()
     except (OSError, HTTPException) as error:
@@ -57,32 +60,37 @@ def _connection(url: str) -> HTTPConnection:
     return HTTPConnection(host, parts.port, timeout=CONNECT_S)
 
 
-def _stream(wire: socket.socket, data: bytes, rate: float, ended: threading.Event) -> None:
+def _stream(wire: socket.socket, data: bytes, rate: float, ended: threading.Event) -> bool:
     wire.settimeout(SEND_S)
     size, began = max(1, round(PIECE_S * rate)), time.monotonic()
     for at in range(0, len(data), size):
         if ended.wait(max(0.0, began + at / rate - LEAD_S - time.monotonic())):
-            return
-        _answer(wire, 0.0)
+            return True
+        if not _known(wire, 0.0):
+            return False
         wire.sendall(data[at : at + size])
     ended.wait(max(0.0, began + len(data) / rate - time.monotonic()))
+    return True
 
 
-def _answer(wire: socket.socket, wait_s: float) -> bytes:
-    """The status of an answer that has come, and what follows; empty when there is none. Refused when it is a no."""
+def _known(wire: socket.socket, wait_s: float) -> bool:
+    """Whether no answer has come that the login is not known; Refused when it is another no."""
     if not select.select([wire], [], [], wait_s)[0]:
-        return b""
+        return True
     said = wire.recv(4096)
     if not said:
         raise Away("the camera ended the connection")
     status = said.partition(b" ")[2]
-    if not status.startswith((b"200", b"401")) or b"\r\n\r\nerror" in said.lower():
+    if status.startswith(b"401"):
+        return False
+    if not status.startswith(b"200") or b"\r\n\r\nerror" in said.lower():
         raise Refused(f"the camera does not take the sound: {' '.join(said.decode('ascii', 'replace').split())[:80]}")
-    return status
+    return True
 
 
-def _leave(wire: socket.socket) -> None:
+def _leave(wire: socket.socket) -> bool:
     """Says that this was all; closing at once would throw away what the camera has not read yet."""
     wire.shutdown(socket.SHUT_WR)
-    if select.select([wire], [], [], FAREWELL_S)[0]:
-        wire.recv(4096)
+    if not select.select([wire], [], [], FAREWELL_S)[0]:
+        return True
+    return not wire.recv(4096).partition(b" ")[2].startswith(b"401")
