@@ -54,7 +54,7 @@ class Answers:
         self.publish = publish
         self.where = where
         self.ranges = ranges
-        self.counts = dict.fromkeys(FINAL, 0)
+        self.counts = {f"orders_{state}": 0 for state in FINAL}
         self._taken: list[Job] = []  # what has an answer, and not its last one
 
     def tell(self, job: Job, state: OrderState, error: str | None = None, *, clamped: bool = False) -> None:
@@ -64,7 +64,7 @@ class Answers:
         job.state = state
         self._taken = [one for one in self._taken if one is not job]
         if job.ended:
-            self.counts[state] += 1
+            self.counts[f"orders_{state}"] += 1
         else:
             self._taken.append(job)
         result = OrderResult(
@@ -100,5 +100,5 @@ class Answers:
         else:
             found = glean(message.payload)
             refused = job(key, message.payload[:MOST_SAID].decode(errors="replace"), found.by, found.id, message)
-            why += f"; expected {self.ranges}" if row is topics.CAMERA_POSITION_SET else ""
+            why += f"; expected {self.ranges}" if key in ("Position", "Zoom") else ""
         self.tell(refused, "refused", why)

@@ -132,7 +132,8 @@ class CameraService:
         self.stage.tick(now)
         self.motors.tick(now)
         self.health.moving = self.motors.busy
-        self.counters |= {"frames": self.scanner.frames, "failed_snapshots": self.feed.spoilt.count}
+        counts = {"frames": self.scanner.frames, "failed_snapshots": self.feed.spoilt.count}
+        self.counters |= counts | self.answers.counts
         self.scanner.tick(now)
         self._watch_motion(now)
         self.bulletin.tick(now, self.counters)
@@ -218,7 +219,7 @@ class CameraService:
     def _read(self, read: topics.Read, now: float) -> None:
         payload = read.payload
         if read.topic is topics.CAMERA_SNAPSHOT_GET:
-            self.stage.begin(self.feed.published(), now, _nobody)
+            self._begin(self.feed.published(), now)
         elif read.topic in ENTITY_TOPICS:
             self.discovery.hear(read)
         elif isinstance(payload, ScanResult):
@@ -233,8 +234,8 @@ class CameraService:
                 command = orders.read(job.key, payload.value)
             except Refused as error:
                 self.answers.tell(job, "refused", str(error))
-            else:
-                self._take(job, command, now)
+                raise BadMessage(f"{read.message.topic}: {error}") from error
+            self._take(job, command, now)
 
     def _take(self, job: Job, command: Command, now: float) -> None:
         job.command = command

@@ -33,7 +33,7 @@ from services.camera.scan.analysis import ANALYSED, Analysed, Task
 from services.camera.scan.sightings import Eye
 from services.camera.service import CameraService
 from services.camera.settings import Config
-from services.errors import DeviceError
+from services.errors import BadMessage, DeviceError
 from services.vision.detect import Detection
 from services.vision.frames import Mount
 from services.vision.lens import Lens
@@ -162,6 +162,7 @@ class Flat:
         self.camera = VirtualCamera(self.motors, lambda: self.now)
         self.inbox: list[Message] = []
         self.said: list[Message] = []
+        self.dropped: list[str] = []  # as the runner does with what makes no sense
         self.markers: dict[int, tuple[float, float]] = {}
         config = Config(folder=folder, url="http://192.0.2.9", targets=(582,), **settings)
         matrix = np.array([[1158.4, 0, 1147.2], [0, 1156.9, 652.8], [0, 0, 1]])
@@ -197,7 +198,10 @@ class Flat:
 
     def _turn(self) -> None:
         while self.inbox:
-            self.said += self.service.handle(self.inbox.pop(0), self.now)
+            try:
+                self.said += self.service.handle(self.inbox.pop(0), self.now)
+            except BadMessage as error:
+                self.dropped.append(str(error))
         self.said += self.service.tick(self.now)
 
     def online(self) -> Flat:

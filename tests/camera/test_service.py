@@ -11,7 +11,8 @@ import pytest
 from services import payloads
 from services.bus import Message
 from services.camera.capabilities import Capabilities, GetCapabilities
-from services.camera.device import Away, BadLogin, Direction, MoveOver, MoveTo, Start, Status, Stop
+from services.camera.device import Away, BadLogin, Direction, MoveOver, MoveTo, SetPicture, Start, Status, Stop
+from services.camera.scan.modes import Before
 from services.errors import BadMessage
 from services.topics import read
 from tests.camera.flat import Flat
@@ -156,6 +157,11 @@ def test_keys_and_place_names_are_matched_without_regard_to_case(flat: Flat) -> 
         ("order/Goto", b'{"value": "Kitchen", "by": "cat", "id": "c"}', {}, "Goto", "c", "by"),
         ("order/Goto", b'{"id": {"id": 1}, "value": 1}', {}, "Goto", None, "id"),
         ("order/Goto", b'{"a":' * 9999, {}, "Goto", None, "Invalid JSON"),
+        ("order/Zoom", b'{"value": NaN, "id": "z"}', {}, "Zoom", "z", "zoom 0 to 8"),
+        ("order/Zoom_In", b'{"value": 1, "id": "k"}', {}, "Zoom_In", "k", "no order 'Zoom_In'"),
+        ("order/Goto2", b"Kitchen", {}, "Goto2", None, "there are"),
+        ("order/", b"Kitchen", {}, "", None, "there are"),
+        ("order/Move", b"Sideways", {}, "Move", None, "expected Stop"),
     ],
 )
 def test_an_order_that_is_late_or_makes_no_sense_is_refused_with_an_answer(
@@ -206,6 +212,15 @@ def test_an_order_that_cannot_be_done_is_refused_with_the_reason(
     assert flat.states() == ["refused"]
     assert told in flat.last()["error"]
     assert not flat.started()
+    assert flat.service.counters["orders_refused"] == 1
+
+
+def test_an_order_that_nobody_can_read_is_dropped_like_any_other_bad_message(flat: Flat) -> None:
+    flat.order("Dance", "now")
+    flat.order("Move", "Sideways")
+    assert [text.partition(":")[0] for text in flat.dropped] == ["camera/ip1/order/Dance", "camera/ip1/order/Move"]
+    flat.order("Goto", "Garden")  # this one was understood
+    assert len(flat.dropped) == 2
 
 
 def test_position_set_moves_and_leaves_what_is_left_out(flat: Flat) -> None:
@@ -554,3 +569,12 @@ def test_what_is_not_an_order_is_told_to_the_runner(tmp_path: Path, message: Mes
     flat = Flat(tmp_path, places=Path())
     with pytest.raises(BadMessage):
         list(flat.service.handle(message, 1000.0))
+
+
+def test_two_who_would_restore_the_picture_do_not_wait_for_each_other(flat: Flat) -> None:
+    modes = flat.service.scanner.modes
+    modes.noted, modes.changed = Before("color", ()), True
+    steps = flat.service.scanner.restored(), flat.service.scanner.restored()
+    assert isinstance(next(steps[0]), SetPicture)  # the camera has not answered it yet
+    with pytest.raises(StopIteration):
+        next(steps[1])
