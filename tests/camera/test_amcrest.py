@@ -99,6 +99,34 @@ def test_a_stop_of_unknown_motion_stops_every_code_although_some_are_refused() -
     assert len(web.asked) == len(Direction)
 
 
+def test_a_stop_gets_through_where_it_takes_long_to_be_let_in_and_waits_shortly_until_that_is_likely() -> None:
+    waits: list[float] = []
+    way_s = float("inf")
+
+    def far(request: httpx.Request) -> httpx.Response:
+        waits.append(request.extensions["timeout"]["connect"])
+        if waits[-1] < way_s:
+            raise httpx.ConnectTimeout("timed out", request=request)
+        return httpx.Response(200, text="OK\r\n")
+
+    address = Address("http://192.0.2.10", "admin", SecretStr("secret123"), channel=1)
+    device = amcrest.Amcrest(address, httpx.MockTransport(far), Gate(pause=lambda seconds: None))
+    device.running = "Left"
+    for _ in range(40):
+        with pytest.raises(Away):
+            device.send(Stop())
+    assert waits[:20] == [0.45] * 20  # a network that is back within 10 s is met at once
+    assert max(waits) < 1.0  # and any other within 1 s
+    way_s = 0.7
+    for _ in range(3):
+        with pytest.raises(Away):
+            device.send(Stop())
+    device.send(Stop())
+    way_s, waits[:] = 0.0, []
+    device.send(Stop())
+    assert waits == [0.45]
+
+
 def test_where_firmware_refuses_plain_brackets_they_are_encoded_from_then_on() -> None:
     web = Web()
     table = "table.VideoInOptions[0].DayNightColor=1\r\ntable.VideoInOptions[0].Flip=true\r\n"

@@ -33,7 +33,7 @@ from services.camera.device import (
     TurnFor,
 )
 from services.camera.sound.desk import Sound
-from services.camera.web.connection import COMMAND, SNAPSHOT, STOP, connection, fetch, respelt
+from services.camera.web.connection import COMMAND, SNAPSHOT, connection, fetch, knock, respelt
 from services.camera.web.dahua import DahuaEar, DahuaSound
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
@@ -55,6 +55,7 @@ class Amcrest:
         self.http = connection(address, self.login, transport)
         self.channel = address.channel
         self.running: str | None = None  # the code of the motion that may be under way
+        self._stops = 0  # in a row that had no answer
         self._encodes = False  # brackets; most firmware reads them as they are
         self._in_day_night: bool | None = None  # the firmware keeps the mode in VideoInDayNight; None: not known yet
 
@@ -134,13 +135,15 @@ class Amcrest:
         if self.running in ptz.UNSTOPPABLE:  # a start takes its place, and that can be stopped
             self._start(Start(Direction.LEFT))
         refused: list[Refused] = []
+        self._stops += 1
         known = ptz.code_of(request.direction) if request.direction else self.running
         codes = [known] if known is not None and not request.every else [*map(ptz.code_of, Direction)]
         for code in codes:
             try:
-                self._command(ptz.stop(code, channel), STOP)
+                self._command(ptz.stop(code, channel), knock(self._stops))
             except Refused as error:  # firmware that refuses to stop what does not run
                 refused.append(error)
+        self._stops = 0
         if len(refused) == len(codes):
             raise refused[0]
         return None

@@ -167,9 +167,9 @@ class Motors:
         """Ends what runs or waits, with a stop where there may be motion."""
         self._call_off_next(why)
         if self._run is not None:
-            self.stage.drop(self._run)
-            self._run = None
+            run, self._run = self._run, None
             self._halt(stop(now), now)
+            self.stage.drop(run)  # after it: what a plan has learnt is written at its end
             self._end("cancelled", why, now)
 
     def _call_off_next(self, why: str, state: OrderState = "cancelled") -> None:

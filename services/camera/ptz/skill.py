@@ -21,6 +21,7 @@ RelativeForm = Literal["moveRelatively", "Position"]
 Honours = Literal["unknown", "no", "pan", "yes"]  # of a way to let the firmware drive; pan: it ignores tilt
 DRIVES = (45.0, 27.0, 4.0)  # degrees/s, levels/s: the firmware's own moves, a guess to begin with
 KEEP = 120  # answers, for how long they take
+LONGEST_S = 30.0  # no answer takes so long, its connection gives up before
 LATENCY_S, SPREAD_S = 0.3, 0.1  # of an answer, before any was measured
 TAIL_S = 1.0  # an answer may always come so much later than usual: busy Wi-Fi does that to two in a hundred
 TAIL_PART = 3.3  # of the usual time, where that is long
@@ -141,7 +142,12 @@ class Skill:
         self.paces, self.drives, self.timing, self.surprise = deepcopy(known)
 
     def timed(self, seconds: float) -> None:
-        """An answer took so long; what is usual may change with it, and what was learnt against that stays as true."""
+        """An answer took so long; what is usual may change with it, and what was learnt against that stays as true.
+
+        No answer takes LONGEST_S, nor less than nothing: the clock was set meanwhile.
+        """
+        if not 0.0 <= seconds <= LONGEST_S:
+            return
         before = self.timing.usual
         self.timing.learn(seconds)
         for pace in (*self.paces, *self.drives):

@@ -161,8 +161,11 @@ class Scanner:
             self._moving.close()
 
     def restored(self) -> Plan[None]:
-        """The picture as it was before a scan changed it, also one of another life; tried until the camera takes it."""
-        while self.modes.changed and (self.scan is None or self.scan.turn == 1):
+        """The picture as it was before a scan changed it, also one of another life; tried until the camera takes it.
+
+        Who finds another at it leaves it to him.
+        """
+        while self.modes.changed and not self.modes.leaving and (self.scan is None or self.scan.turn == 1):
             try:
                 yield from self.modes.leave()
             except DeviceError as error:

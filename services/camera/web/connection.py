@@ -10,6 +10,8 @@ from services.camera.web.digest import Login
 
 COMMAND = httpx.Timeout(6.0, connect=2.0)
 STOP = httpx.Timeout(6.0, connect=0.45)  # a lost knock is repeated by the kernel after 1 s only; we knock sooner
+PATIENT_STOP = httpx.Timeout(6.0, connect=0.9)  # still within 1 s of the network's return
+IN_VAIN, PATIENT_EVERY = 20, 4  # after so many knocks in vain one in so many waits longer
 TURNED_AWAY = ("refuses", "reset by peer", "disconnected without")  # which of httpx' errors say that, by their words
 SNAPSHOT = httpx.Timeout(20.0, connect=2.0)
 
@@ -28,6 +30,11 @@ def fetch(http: httpx.Client, target: str, timeout: httpx.Timeout = COMMAND) -> 
         return http.get(target, timeout=timeout)
     except httpx.HTTPError as error:
         raise lost(error) from error
+
+
+def knock(number: int) -> httpx.Timeout:
+    """The timeouts of a stop after `number - 1` without an answer: on a crowded network one is long on its way."""
+    return PATIENT_STOP if number > IN_VAIN and number % PATIENT_EVERY == 0 else STOP
 
 
 def lost(error: httpx.HTTPError) -> Away:
