@@ -1,4 +1,4 @@
-"""The orders that do not turn the camera, as plans: places, targets, picture options, reboot."""
+"""The orders that do not turn the camera, as plans: targets, picture options, reboot; places are `keeping.py`'s."""
 
 from __future__ import annotations
 
@@ -9,27 +9,16 @@ from services.camera import commands, orders
 from services.camera.bulletin import Bulletin
 from services.camera.calibration.calibrator import Calibrator
 from services.camera.calibration.wishes import TakeLens
-from services.camera.device import (
-    Away,
-    ClearPreset,
-    Picture,
-    Reboot,
-    Refused,
-    Reply,
-    SavePreset,
-    SetPicture,
-    Status,
-)
+from services.camera.device import Away, Picture, Reboot, Refused, Reply, SetPicture, Status
 from services.camera.health import Health
+from services.camera.keeping import Keeper
 from services.camera.looks import Looks
 from services.camera.orders import Command
-from services.camera.places import Places
 from services.camera.plan import Plan, ask, attempt, wait
-from services.camera.ptz.stand import settle
+from services.camera.ptz.trips import Trips
 from services.camera.scan.scanner import Scanner
 from services.camera.sound.takes import Takes
 from services.camera.video.feed import Feed
-from services.payloads import Place
 
 # These are taken while it is away too; a stream can be switched off then.
 WITHOUT_CAMERA = orders.ShowScan | orders.Targets | orders.Routine | orders.Broadcast | TakeLens
@@ -42,7 +31,7 @@ class Chores:
 
     def __init__(
         self,
-        places: Places,
+        trips: Trips,
         scanner: Scanner,
         health: Health,
         bulletin: Bulletin,
@@ -50,15 +39,16 @@ class Chores:
         takes: Takes,
         calibrator: Calibrator,
     ) -> None:
-        self.places = places
+        self.places = trips.places
         self.scanner = scanner
         self.health = health
         self.bulletin = bulletin
         self.looks = Looks(bulletin.facts)
+        self.keeper = Keeper(trips.places, bulletin, trips.abilities)
         self.takes = takes
         self._plans: dict[type, Callable[[Any, float], Plan[None]]] = {
-            orders.SavePlace: self._save,
-            orders.RemovePlace: self._remove,
+            orders.SavePlace: self.keeper.save,
+            orders.RemovePlace: self.keeper.remove,
             orders.ShowScan: self._show,
             orders.Targets: self._targets,
             orders.Routine: self._routine,
@@ -75,24 +65,6 @@ class Chores:
     def plan(self, command: Command, now: float) -> Plan[None]:
         """The plan; it raises Refused or another DeviceError when the order cannot be carried out."""
         return self._plans[type(command)](command, now)
-
-    def _save(self, order: orders.SavePlace, now: float) -> Plan[None]:
-        if self.bulletin.turning:
-            raise Refused("the camera is moving")
-        reading, _ = yield from settle(None)
-        old = self.places.named.get(order.place)
-        preset = old.preset if old is not None and old.preset is not None else self.places.free_preset()
-        saved = yield from attempt(SavePreset(preset))
-        if isinstance(saved.error, Away):
-            raise saved.error
-        number = preset if saved.error is None else None  # without presets the place still works
-        self.places.save(order.place, Place(pan=reading.pan, tilt=reading.tilt, zoom=reading.zoom, preset=number))
-
-    def _remove(self, order: orders.RemovePlace, now: float) -> Plan[None]:
-        place = self.places.get(order.place)
-        self.places.remove(order.place)
-        if place.preset is not None:
-            yield from attempt(ClearPreset(place.preset))
 
     def _show(self, order: orders.ShowScan, now: float) -> Plan[None]:
         self.scanner.show = order.on

@@ -1,4 +1,4 @@
-"""Requests about the device itself: its clock, its alarms, its privacy mode, contrast, storage, sound. Values only.
+"""Requests about the device itself: its clock, alarms, privacy mode, contrast, presets, storage, sound. Values only.
 
 They have the rank of settings. What they are in a brand's words is in `brands/`; a brand may refuse any of them.
 """
@@ -53,6 +53,11 @@ class SetContrast(Errand):
     """Sets the contrast of each profile; the answer is the tuple read back."""
 
     values: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class GetPresets(Errand):
+    """Which presets the camera keeps, whoever made them; the answer is a frozenset of their numbers."""
 
 
 @dataclass(frozen=True)

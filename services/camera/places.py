@@ -9,7 +9,7 @@ import fcntl
 import math
 import os
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -94,10 +94,17 @@ class Places:
         """As it is published."""
         return PlacesPayload(dict(self.named))
 
-    def free_preset(self) -> int:
-        """The lowest preset number that no place has."""
-        used = {*(place.preset for place in self.named.values()), *self._only_presets.values()}
-        return next(number for number in range(1, len(used) + 2) if number not in used)
+    @property
+    def presets(self) -> set[int]:
+        """The numbers that our files hold."""
+        numbers = (place.preset for place in self.named.values())
+        return {*(number for number in numbers if number is not None), *self._only_presets.values()}
+
+    def free_preset(self, kept: Collection[int] = (), most: int = 0) -> int | None:
+        """The lowest preset number that no place has, nor the camera already; None above `most` (0: not known)."""
+        used = {*kept, *self.presets}
+        number = next(number for number in range(1, len(used) + 2) if number not in used)
+        return number if number <= most or not most else None
 
     def at(self, reading: Reading) -> str | None:
         """The place that the camera looks at, if it is at one."""

@@ -95,7 +95,7 @@ class CameraService:
         self.bulletin.video = channel
         self.feed = Feed(config, self.health, self.bulletin.facts, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
-        self.chores = Chores(self.places, self.scanner, self.health, self.bulletin, self.feed, takes, self.calibrator)
+        self.chores = Chores(self.trips, self.scanner, self.health, self.bulletin, self.feed, takes, self.calibrator)
         self.motion = MotionWatch(self._begin, config.motion.codes, config.motion.hold_s, on=hears)
         self.upkeep = Upkeep(config.name, config.clock, self.bulletin.facts, self._has_time)
         self._polling = False

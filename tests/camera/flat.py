@@ -28,6 +28,7 @@ from services.camera.device import (
     Start,
     Stop,
 )
+from services.camera.errands import GetPresets
 from services.camera.lanes import REPLY
 from services.camera.scan.analysis import ANALYSED, Analysed, Task
 from services.camera.scan.sightings import Eye
@@ -55,7 +56,9 @@ class VirtualCamera:
         self.remembers: bool | None = None
         self.met = 0  # how often it was asked who it is
         self.errands: list[Errand] = []
-        self.answers: dict[type[Errand], Callable[[Any], object]] = {}
+        self.answers: dict[type[Errand], Callable[[Any], object]] = {
+            GetPresets: lambda asked: frozenset(motors.presets)
+        }
         self.waiting: list[tuple[Request, int]] = []
         self.flying: list[tuple[float, float, Request, int]] = []  # when it is answered, when sent
         self.closed = False

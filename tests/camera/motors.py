@@ -13,6 +13,7 @@ from math import atan, degrees
 from typing import Any, Literal
 
 from services.camera.device import (
+    ClearPreset,
     Direction,
     GotoPreset,
     MoveOver,
@@ -21,6 +22,7 @@ from services.camera.device import (
     Refused,
     Reply,
     Request,
+    SavePreset,
     Start,
     Status,
     Stop,
@@ -195,6 +197,10 @@ class Motors:
                     return None, Refused("no such preset")
                 pan, tilt, zoom = self.presets[number]
                 self._drive_to((180 - pan) % 360, tilt, zoom)
+            case SavePreset(number):
+                self.presets[number] = self.pose
+            case ClearPreset(number):
+                self.presets.pop(number, None)
             case MoveTo(pan, tilt, zoom):
                 if self.absolute == "no":
                     return None, Refused("bad request")

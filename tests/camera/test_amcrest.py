@@ -32,6 +32,7 @@ from services.camera.device import (
     Status,
     Stop,
 )
+from services.camera.errands import GetPresets
 from services.camera.web.connection import lost
 from services.camera.web.digest import Challenge, authorization, read_challenge
 from services.camera.web.gate import Gate
@@ -75,13 +76,45 @@ def camera(web: Web, channel: int | None = 1) -> amcrest.Amcrest:
         (Start(Direction.ZOOM_OUT), "ptz.cgi?action=start&channel=1&code=ZoomWide&arg1=0&arg2=0&arg3=0"),
         (GotoPreset(7), "ptz.cgi?action=start&channel=1&code=GotoPreset&arg1=0&arg2=7&arg3=0"),
         (SavePreset(7), "ptz.cgi?action=start&channel=1&code=SetPreset&arg1=0&arg2=7&arg3=0"),
+        (GetPresets(), "ptz.cgi?action=getPresets&channel=1"),
         (Reboot(), "magicBox.cgi?action=reboot"),
     ],
 )
 def test_each_request_is_one_target(request_: Request, target: str) -> None:
     web = Web()
+    web.answer = lambda target: httpx.Response(200, text="" if "getPresets" in target else "OK\r\n")
     camera(web).send(request_)
     assert web.asked == [f"/cgi-bin/{target}"]
+
+
+@pytest.mark.parametrize(
+    ("body", "numbers"),
+    [
+        ("presets[0].Index=1\r\npresets[0].Name=Kitchen\r\npresets[1].Index=12\r\npresets[1].Name=Sofa\r\n", {1, 12}),
+        (
+            "presets[0].Index=7\r\npresets[0].Name=a.Index=3\r\npresets[0].Position=[900,-900,5]\r\npresets[0].Type=0",
+            {7},
+        ),
+        ("", set()),
+        ("\r\n", set()),
+    ],
+)
+def test_presets_are_told_by_their_numbers_and_not_by_their_place_in_the_list(body: str, numbers: set[int]) -> None:
+    web = Web()
+    web.answer = lambda target: httpx.Response(200, text=body)
+    assert camera(web).send(GetPresets()) == numbers
+
+
+@pytest.mark.parametrize(
+    "body",
+    ["OK\r\n", "<html><body>Please log in</body></html>", "presets[0].Name=Sofa\r\n", "presets[0].Index=one\r\n",
+     "presets[0].Index=1\r\npresets[1].Na=\r\n", f"presets[0].Index={'9' * 5000}\r\n", "status.Postion[0]=1\r\n"],
+)  # fmt: skip
+def test_a_list_of_presets_that_makes_no_sense_is_not_taken_for_one(body: str) -> None:
+    web = Web()
+    web.answer = lambda target: httpx.Response(200, text=body)
+    with pytest.raises(Refused, match="does not tell"):
+        camera(web).send(GetPresets())
 
 
 def test_a_stop_carries_the_code_that_was_started() -> None:

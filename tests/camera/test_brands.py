@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import socket
 import threading
 from collections.abc import Iterator
@@ -36,6 +37,7 @@ from services.camera.device import (
     Status,
     Stop,
 )
+from services.camera.errands import GetPresets
 from services.camera.lanes import same
 from services.camera.settings import Config
 from services.camera.watchdog import connector
@@ -43,7 +45,8 @@ from services.camera.web.gate import Gate
 from services.errors import DeviceError
 from services.peers import free_port, wait_until
 from services.simulators import camera as simulated
-from tests.camera.bench import PASSWORD, bench, simulator
+from services.simulators.camera.motors import Pose
+from tests.camera.bench import PASSWORD, SHIPPED, bench, simulator
 
 BRANDS = sorted(file.stem for file in Path(brands.__path__[0]).glob("[a-z]*.py"))
 FREE = 20  # a preset that nobody has stored
@@ -202,6 +205,24 @@ def test_a_preset_is_kept_gone_to_and_forgotten(driver: Camera, camera: simulate
     driver.send(ClearPreset(FREE))
 
 
+def test_it_tells_which_presets_there_are_whoever_made_them(driver: Camera, camera: simulated.Simulated) -> None:
+    numbers = {int(number) for number in state(camera)["presets"]}
+    assert driver.send(GetPresets()) == numbers
+    driver.send(SavePreset(FREE))
+    assert FREE in numbers_of(driver)
+    assert numbers_of(driver) >= numbers
+    driver.send(ClearPreset(FREE))
+    assert driver.send(GetPresets()) == numbers
+    camera.server.device.ptz.presets.clear()
+    assert driver.send(GetPresets()) == frozenset()
+
+
+def numbers_of(driver: Camera) -> frozenset[int]:
+    found = driver.send(GetPresets())
+    assert isinstance(found, frozenset)
+    return found
+
+
 def test_a_preset_of_the_cameras_own_can_be_gone_to(driver: Camera, camera: simulated.Simulated) -> None:
     before = reading(driver)
     number = next(int(number) for number in state(camera)["presets"])
@@ -308,6 +329,25 @@ def test_the_whole_service_goes_to_a_place(brand: str, tmp_path: Path) -> None:
         assert abs((now.pan - place.pan + 180) % 360 - 180) <= 0.5
         assert abs(now.tilt - place.tilt) <= 0.5
         assert not here.truth()["moving"]
+
+
+def test_the_whole_service_leaves_the_owners_presets_alone(brand: str, tmp_path: Path) -> None:
+    (tmp_path / "ip1").mkdir()
+    shutil.copy(SHIPPED / "ip1" / "ost.yaml", tmp_path / "ip1")
+    with simulator(latency_s=0.05) as camera:
+        kept = camera.server.device.ptz.presets
+        kept.clear()
+        kept |= {1: ("Front door", Pose(200.0, 20.0, 0.0)), 2: ("Bed", Pose(300.0, 50.0, 2.0))}
+        owners = dict(kept)
+        with bench(tmp_path, camera, brand=brand) as here:
+            here.order("SaveAs", "Kitchen", "1")
+            assert here.end_of("1", 30)["state"] == "done"
+            assert here.service.places.get("Kitchen").preset == 3
+            assert set(kept) == {1, 2, 3}
+            assert {number: kept[number] for number in owners} == owners
+            here.order("Remove", "Kitchen", "2")
+            assert here.end_of("2", 30)["state"] == "done"
+            assert kept == owners
 
 
 def reading_of(place: Any) -> Reading:

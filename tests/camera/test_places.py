@@ -149,6 +149,18 @@ def test_a_preset_without_a_position_stays_in_its_file_and_its_number_is_not_use
     assert Places(tmp_path).named["Balcony"] == Place(pan=3.0, tilt=4.0, preset=1)
 
 
+@pytest.mark.parametrize(
+    ("kept", "most", "free"),
+    [((), 0, 3), ({1, 3, 4}, 0, 5), ({3, 5}, 25, 4), ({3, 4}, 4, None), ((), 2, None), ({7, 300}, 3, 3)],
+)
+def test_a_free_preset_is_nobodys_and_one_that_the_camera_can_keep(
+    tmp_path: Path, kept: set[int], most: int, free: int | None
+) -> None:
+    (tmp_path / "preset_position.yaml").write_text("Sofa: [1, 2, 0]\nTV: [3, 4, 0]\n")
+    (tmp_path / "preset_coords.yaml").write_text("Sofa: 2\nBalcony: 1\n")
+    assert Places(tmp_path).free_preset(kept, most) == free
+
+
 def test_a_place_that_was_added_by_hand_a_moment_ago_is_not_lost(tmp_path: Path) -> None:
     places = Places(tmp_path)
     places.save("One", Place(pan=1.0, tilt=2.0))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pydantic import SecretStr
 
 from services.camera.address import Address
-from services.camera.brands.onvif import Onvif, Profile, position, read_reading
+from services.camera.brands.onvif import PTZ, Onvif, Profile, position, read_presets, read_reading
 from services.camera.device import Away, BadLogin, Locked, Reading, Refused, Status
 from services.camera.web.gate import Gate
 from services.camera.web.soap import FIRST, Soap, envelope, read_envelope, token
@@ -158,3 +158,13 @@ def test_a_camera_without_ptz_service_says_so() -> None:
     camera = Onvif(ADDRESS, Gate(), httpx.MockTransport(Device(clock(3), services)))
     with pytest.raises(Refused, match="does not offer"):
         camera.send(Status())
+
+
+def test_a_preset_has_the_number_of_our_name_and_that_of_its_token() -> None:
+    kept = {"1": "Door", "12": "apartment-3", "preset-a": "apartment-4", "preset-b": "Bed", "9" * 5000: "²", "": ""}
+    told = "".join(
+        f'<Preset xmlns="{PTZ}" token="{token}"><Name xmlns="http://www.onvif.org/ver10/schema">{name}</Name></Preset>'
+        for token, name in kept.items()
+    )
+    found = read_presets(read_envelope(200, envelope("", f"<a>{told}</a>")))
+    assert found == {1: "1", 3: "12", 4: "preset-a", 12: "12"}

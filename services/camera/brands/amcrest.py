@@ -32,6 +32,7 @@ from services.camera.device import (
     Stop,
     TurnFor,
 )
+from services.camera.errands import GetPresets
 from services.camera.sound.desk import Sound
 from services.camera.web.connection import COMMAND, SNAPSHOT, connection, fetch, knock, respelt
 from services.camera.web.dahua import DahuaEar, DahuaSound
@@ -78,6 +79,8 @@ class Amcrest:
                 code = {GotoPreset: "GotoPreset", SavePreset: "SetPreset", ClearPreset: "ClearPreset"}[type(request)]
                 self.running = code if isinstance(request, GotoPreset) else self.running
                 return self._command(ptz.preset(code, number, self._known_channel()))
+            case GetPresets():
+                return ptz.read_presets(self._get(ptz.presets(self._known_channel())).text)
             case Snapshot():
                 return self._snapshot()
             case GetPicture():

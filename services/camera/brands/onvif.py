@@ -9,6 +9,7 @@ ONVIF does not tell how the picture is flipped, so there the configuration count
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from math import isfinite, nan
 from urllib.parse import urlsplit
@@ -21,6 +22,7 @@ from services.camera import device
 from services.camera.address import Address
 from services.camera.capabilities import Capabilities, GetCapabilities
 from services.camera.device import Away, Camera, Identity, Reading, Refused, Start, StreamAddress
+from services.camera.errands import GetPresets
 from services.camera.web.connection import SNAPSHOT, connection, fetch
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
@@ -81,11 +83,13 @@ class Onvif:
             case device.Status():
                 return read_reading(self._ptz("GetStatus"), self._known_profile(), self.address)
             case device.GotoPreset(number):
-                return self._command("GotoPreset", _token("PresetToken", self._preset(number)))
-            case device.SavePreset(number):
-                return self._save(number)
+                return self._goto(number)
+            case device.SavePreset(number):  # without a token the camera chooses one
+                return self._command("SetPreset", f"<PresetName>apartment-{number}</PresetName>{self._preset(number)}")
             case device.ClearPreset(number):
                 return self._clear(number)
+            case GetPresets():
+                return frozenset(self._presets())
             case device.Snapshot():
                 return self._snapshot()
             case device.FindStream():
@@ -137,28 +141,22 @@ class Onvif:
         self._ptz(action, inner)
         return None
 
-    def _preset(self, number: int) -> str:
-        """The camera's token for a number of ours; Refused when nothing is kept there."""
-        told = self._ptz("GetPresets").iterfind(f"{{{PTZ}}}Preset")
-        kept = {one.get("token", ""): one.findtext(f"{SCHEMA}Name") for one in told}
-        ours = [token for token, name in kept.items() if name == f"apartment-{number}"]
-        if ours or str(number) in kept:
-            return ours[0] if ours else str(number)
-        raise Refused(f"the camera has no preset {number}")
+    def _presets(self) -> dict[int, str]:
+        return read_presets(self._ptz("GetPresets"))
 
-    def _save(self, number: int) -> object:
-        try:
-            known = _token("PresetToken", self._preset(number))
-        except Refused:
-            known = ""  # then the camera chooses the token
-        return self._command("SetPreset", f"<PresetName>apartment-{number}</PresetName>{known}")
+    def _preset(self, number: int) -> str:
+        """The camera's token for a number of ours; nothing when nothing is kept there."""
+        token = self._presets().get(number)
+        return "" if token is None else _token("PresetToken", token)
+
+    def _goto(self, number: int) -> object:
+        if not (known := self._preset(number)):
+            raise Refused(f"the camera has no preset {number}")
+        return self._command("GotoPreset", known)
 
     def _clear(self, number: int) -> object:
-        try:
-            known = self._preset(number)
-        except Refused:
-            return None
-        return self._command("RemovePreset", _token("PresetToken", known))
+        known = self._preset(number)
+        return self._command("RemovePreset", known) if known else None
 
     def _snapshot(self) -> bytes:
         told = self._ask(MEDIA, "GetSnapshotUri", _token("ProfileToken", self._known_profile().token))
@@ -224,6 +222,13 @@ def read_capabilities(node: Element) -> Capabilities:
         timed="ContinuousPanTiltVelocitySpace" in kinds,
         zoom="ContinuousZoomVelocitySpace" in kinds,
     )
+
+
+def read_presets(told: Element) -> dict[int, str]:
+    """The camera's tokens by number; a name of ours counts more than what the token is."""
+    kept = {one.get("token", ""): one.findtext(f"{SCHEMA}Name") or "" for one in told.iterfind(f"{{{PTZ}}}Preset")}
+    plain = {int(token): token for token in kept if re.fullmatch("[0-9]{1,9}", token)}
+    return plain | {int(name[10:]): token for token, name in kept.items() if re.fullmatch("apartment-[0-9]{1,9}", name)}
 
 
 def read_reading(told: Element, profile: Profile, address: Address) -> Reading:

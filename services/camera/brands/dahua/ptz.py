@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from services.camera.brands.dahua.replies import read_table
-from services.camera.device import Away, Direction, MoveOver, MoveTo, Reading, Start, TurnFor
+from services.camera.device import Away, Direction, MoveOver, MoveTo, Reading, Refused, Start, TurnFor
 
 CODES = {
     Direction.LEFT: "Left",
@@ -87,6 +88,24 @@ def stop(code: str | Direction, channel: int) -> str:
 def preset(code: str, number: int, channel: int) -> str:
     """GotoPreset, SetPreset or ClearPreset."""
     return ptz("start", code, channel, (0, number, 0))
+
+
+def presets(channel: int) -> str:
+    """Asks which presets there are."""
+    return f"/cgi-bin/ptz.cgi?action=getPresets&channel={channel}"
+
+
+def read_presets(body: str) -> frozenset[int]:
+    """Their numbers, which are not those of the list; of none at all it says nothing. Refused when it is no such list.
+
+    An entry without its number makes it none: what it keeps there would be overwritten.
+    """
+    table = read_table(body)
+    entries = {key.partition(".")[0] for key in table}
+    numbers = [table.get(f"{entry}.Index", "") for entry in entries if re.fullmatch(r"presets\[[0-9]+\]", entry)]
+    if not all(re.fullmatch(r"[0-9]{1,9}", number) for number in numbers) or bool(numbers) != bool(body.strip()):
+        raise Refused(f"the camera does not tell its presets: {' '.join(body.split())[:80]!r}")
+    return frozenset(map(int, numbers))
 
 
 def status(channel: int) -> str:
