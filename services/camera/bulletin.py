@@ -11,9 +11,8 @@ from services import topics
 from services.bus import Message
 from services.camera.device import Identity, Reading, Refused
 from services.camera.health import Health
-from services.camera.lanes import same
+from services.camera.lanes import OVERRULES, same
 from services.camera.places import Places
-from services.camera.ptz.stand import OVERRULES
 from services.camera.upkeep import Facts
 from services.camera.video.channel import Channel
 from services.errors import ConfigError

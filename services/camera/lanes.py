@@ -38,6 +38,7 @@ from services.runner import Post
 
 REPLY = "/camera/reply"
 GAP_S = 0.45  # between two readings that are compared: the slowest speed shows in that time
+OVERRULES = 4  # readings in a row that are as the one before, whatever the camera says of its motion
 STILL_DEG = 0.25  # two readings nearer than this are the same: the resolution is 0.1 degree, and some dither by that
 STOP_ALONE_S = 1.0  # longer than the pause between two tries of a stop
 END_S = 3.5  # the end of the service waits so long for a camera to stand still; then its watchdog goes on
@@ -69,6 +70,27 @@ class _Waiting:
     ticket: int
 
 
+class _Rest:
+    """Whether readings show that a motion has ended which nobody stops: the firmware's own, or one it will not stop.
+
+    `patient`: that takes as many as where the camera says that it moves.
+    """
+
+    def __init__(self, *, patient: bool) -> None:
+        self._patient = patient
+        self._before: tuple[Reading, float] | None = None
+        self._equal = 0
+
+    def shown_by(self, reading: Reading, at: float) -> bool:
+        """One more reading, asked at that time: sooner than GAP_S after another one it proves no rest."""
+        before, asked = self._before or (None, at)
+        if before is None or not same(before, reading):
+            self._before, self._equal = (reading, at), 0
+        elif at - asked >= GAP_S:
+            self._before, self._equal = (reading, at), self._equal + 1
+        return self._equal >= (OVERRULES if self._patient or reading.moving is True else 1)
+
+
 class Lane:
     """One thread, one connection, one request in flight."""
 
@@ -89,8 +111,7 @@ class Lane:
         self.started = False  # a motion may be running
         self._others_at = 0.0  # until then only a stop is sent
         self._met = False  # it has told where it looks, and so has been logged in to
-        self._driven: Reading | None = None  # the last reading since the firmware began to drive
-        self._drives = False
+        self._rest: _Rest | None = None  # of what runs; None: only a stop ends it
         self._waiting: list[_Waiting] = []
         self._numbers = itertools.count()
         self._changed = threading.Condition()
@@ -134,7 +155,7 @@ class Lane:
         while (waiting := self._next()) is not None:
             sent = self.clock()
             try:
-                result = self._send(waiting.request)
+                result = self._send(waiting.request, sent)
             except DeviceError as error:
                 if isinstance(error, Away) and self.started:
                     self._others_at = self.clock() + STOP_ALONE_S
@@ -142,6 +163,8 @@ class Lane:
                     self._in_vain(error)
                 elif isinstance(waiting.request, Stop):
                     self.owing(False)  # it has arrived, whatever the camera thinks of it
+                    if isinstance(error, Refused) and self.started:
+                        self._rest = self._rest or _Rest(patient=True)
                 self._answer(waiting, None, error, sent)
             else:
                 self._answer(waiting, result, None, sent)
@@ -160,25 +183,21 @@ class Lane:
                 self._changed.wait(pause if self._waiting else None)
             return None
 
-    def _send(self, request: Request) -> object:
+    def _send(self, request: Request, sent: float) -> object:
         if isinstance(request, Start | FIRMWARE):
             self.started = True  # before it is sent: a start whose answer is lost may have been heard
-            self._drives, self._driven = isinstance(request, FIRMWARE) and not isinstance(request, TurnFor), None
+            self._rest = None if isinstance(request, Start | TurnFor) else _Rest(patient=False)
             self.turning(request.direction if isinstance(request, Start) else DRIVE)
         result = self.camera.send(request)
-        if isinstance(request, Stop) or (isinstance(result, Reading) and self._has_driven(result)):
-            self.started = self._drives = False
+        rests = self._rest is not None and isinstance(result, Reading) and self._rest.shown_by(result, sent)
+        if isinstance(request, Stop) or rests:
+            self.started, self._rest = False, None
             self.turning(None)
             self.owing(False)
         elif isinstance(result, Reading) and not self._met and not self.started:
             self.turning(None)  # whoever ends motions in our place may make itself known there too
         self._met = self._met or isinstance(result, Reading)
         return result
-
-    def _has_driven(self, reading: Reading) -> bool:
-        """Whether what the firmware drove by itself stands; nobody stops that."""
-        before, self._driven = self._driven, reading
-        return self._drives and before is not None and reading.moving is not True and same(before, reading)
 
     def _answer(self, waiting: _Waiting, result: object, error: DeviceError | None, sent: float) -> None:
         reply = Reply(waiting.request, waiting.ticket, result, error, sent, self.clock())
@@ -225,6 +244,7 @@ def stand_still(
     """Sends a stop until it is confirmed and two readings are equal; whether that was so within the limit.
 
     What the firmware drives by itself has no stop of its own everywhere: a slow start takes its place, once, which has.
+    Some refuses to stop what does not run: where every stop is refused, two equal readings are enough.
     """
     end = clock() + limit_s
     every, drives = False, direction == DRIVE
@@ -232,10 +252,8 @@ def stand_still(
         direction = Direction.LEFT
     while clock() < end:
         try:
-            if drives:
-                camera.send(Start(Direction.LEFT))
-                drives = False
-            camera.send(Stop(every=every, direction=direction))
+            drives = drives and not _takes(camera, Start(Direction.LEFT))
+            taken = _takes(camera, Stop(every=every, direction=direction))
             camera.send(Status())  # it may lag behind the motor
             asked, before = clock(), camera.send(Status())
             time.sleep(min(GAP_S, max(0.0, asked + GAP_S - clock())))
@@ -244,11 +262,21 @@ def stand_still(
             log.warning("the stop at the end is not confirmed yet: %s", error)
             time.sleep(0.2)
             continue
-        if isinstance(before, Reading) and isinstance(after, Reading) and same(before, after):
+        rests = isinstance(before, Reading) and isinstance(after, Reading) and same(before, after)
+        if rests and (taken or every):
             return True
         every = True
     log.error("the camera may still be moving: no confirmed stop within %.0f s", limit_s)
     return False
+
+
+def _takes(camera: Camera, request: Start | Stop) -> bool:
+    """Sends it; whether it was not refused."""
+    try:
+        camera.send(request)
+    except Refused:
+        return False
+    return True
 
 
 def same(one: Reading, other: Reading, about: float = 0.0) -> bool:

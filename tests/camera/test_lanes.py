@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import queue
 import threading
+from collections.abc import Sequence
 
 import pytest
 
 from services.bus import Message
+from services.camera import lanes
 from services.camera.device import (
     Away,
+    BadLogin,
     Direction,
     GotoPreset,
     Reading,
@@ -22,6 +26,7 @@ from services.camera.device import (
     Stop,
 )
 from services.camera.lanes import DRIVE, Lanes, stand_still
+from services.errors import DeviceError
 
 WAIT_S = 5.0
 
@@ -167,8 +172,8 @@ def test_the_watchdog_hears_of_a_drive_and_of_its_end() -> None:
     told: list[object] = []
     control, pictures = Slow(), Slow()
     inbox: queue.Queue[Message] = queue.Queue()
-    each = iter((control, pictures))
-    sender = Lanes(lambda: next(each), inbox.put, turning=told.append)
+    each, at = iter((control, pictures)), itertools.count()
+    sender = Lanes(lambda: next(each), inbox.put, lambda: float(next(at)), turning=told.append)
     control.leave.set()
     for ticket, request in enumerate((GotoPreset(3), Status(), Status(), Status())):
         sender.submit(request, ticket)
@@ -194,3 +199,97 @@ def test_while_a_lost_camera_is_owed_a_stop_the_pause_between_two_tries_is_nobod
     sender.submit(Stop(), 4)
     assert [reply(inbox).ticket for _ in range(2)] == [4, 3]
     sender.close()
+
+
+RESTS, STUCK = Reading(10.0, 20.0, 0.0, False), Reading(10.0, 20.0, 0.0, True)  # as some firmware tells for ever
+LOST, NO, NOBODY = Away("no answer"), Refused("nothing runs"), BadLogin("who are you")
+Said = Sequence[tuple[Request, Reading | DeviceError | None]]
+
+
+class Scripted:
+    """A camera that answers as it is told, by a clock that goes `gap` seconds with each; it rests in the end."""
+
+    def __init__(self, answers: Sequence[Reading | DeviceError | None], gap: float) -> None:
+        self.answers, self.gap, self.now = list(answers), gap, 0.0
+        self.got: list[Request] = []
+
+    def send(self, request: Request) -> object:
+        self.got.append(request)
+        self.now += self.gap
+        answer = self.answers.pop(0) if self.answers else RESTS if isinstance(request, Status) else None
+        if isinstance(answer, DeviceError):
+            raise answer
+        return answer
+
+    def close(self) -> None:
+        pass
+
+
+def looks(*answers: Reading | DeviceError) -> Said:
+    return [(Status(), answer) for answer in answers]
+
+
+def creeping(moving: bool | None, speed: float, gap: float) -> Said:
+    return looks(*(Reading(10.0 + number * speed * gap, 20.0, 0.0, moving) for number in range(9)))
+
+
+GOES, TURNS = (GotoPreset(3), None), (Start(Direction.LEFT), None)
+
+
+@pytest.mark.parametrize(
+    ("gap", "said", "ended"),
+    [
+        pytest.param(0.5, [GOES, *looks(RESTS, RESTS)], True, id="a drive that rests"),
+        pytest.param(0.1, [GOES, *looks(RESTS, RESTS, RESTS)], False, id="readings too soon after each other"),
+        pytest.param(0.1, [GOES, *creeping(False, 2.0, 0.1)], False, id="a slow drive, looked at often"),
+        pytest.param(0.5, [GOES, *looks(*5 * [STUCK])], True, id="moving for ever"),
+        pytest.param(0.5, [GOES, *looks(*4 * [STUCK])], False, id="moving for a while"),
+        pytest.param(0.1, [GOES, *looks(*9 * [STUCK])], False, id="moving for a while, looked at often"),
+        pytest.param(0.5, [GOES, *looks(LOST, *5 * [STUCK])], True, id="lost, then moving for ever"),
+        pytest.param(0.5, [TURNS, *looks(*9 * [RESTS])], False, id="a start that nobody has stopped"),
+        pytest.param(0.5, [TURNS, (Stop(), LOST), (Stop(), NO), *looks(*5 * [RESTS])], True, id="a stop is refused"),
+        pytest.param(0.5, [TURNS, (Stop(), NO), *creeping(False, 2.0, 0.5)], False, id="and it turns on"),
+        pytest.param(0.5, [TURNS, (Stop(), NO), TURNS, *looks(*9 * [RESTS])], False, id="and another start follows"),
+        pytest.param(0.5, [TURNS, (Stop(), NOBODY), *looks(*9 * [RESTS])], False, id="a login is refused"),
+    ],
+)
+def test_readings_end_what_nobody_stops_once_they_prove_that_it_rests(
+    monkeypatch: pytest.MonkeyPatch, gap: float, said: Said, *, ended: bool
+) -> None:
+    monkeypatch.setattr(lanes, "STOP_ALONE_S", 0.0)  # its clock goes with its answers only
+    camera, told, inbox = Scripted([answer for _, answer in said], gap), list[object](), queue.Queue[Message]()
+    owed: list[bool] = []
+    sender = Lanes(lambda: camera, inbox.put, lambda: camera.now, turning=told.append, owing=owed.append)
+    for ticket, (request, _) in enumerate(said):
+        sender.submit(request, ticket)
+        reply(inbox)
+    assert (told[-1] is None) == ended
+    assert not (ended and any(owed[-1:])), "and nobody waits for a stop that nobody sends"
+    asked = len(camera.got)
+    sender.close()
+    assert any(isinstance(request, Stop) for request in camera.got[asked:]) != ended
+
+
+class Refusing(Slow):
+    """It says no to every stop, and turns on if it turns."""
+
+    def __init__(self, *, turns: bool) -> None:
+        super().__init__()
+        self.turns, self.pan = turns, 0.0
+        self.leave.set()
+
+    def send(self, request: Request) -> object:
+        super().send(request)
+        if isinstance(request, Stop):
+            raise Refused("nothing runs")
+        self.pan += self.turns
+        return Reading(self.pan, 20.0, 0.0)
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_camera_that_refuses_every_stop_stands_where_its_readings_say_so(*, turns: bool) -> None:
+    camera, at = Refusing(turns=turns), itertools.count()
+    assert stand_still(camera, lambda: float(next(at)), 30.0, direction=Direction.UP) == (not turns)
+    stops = [request for request in camera.got if isinstance(request, Stop)]
+    assert stops[:2] == [Stop(direction=Direction.UP), Stop(every=True, direction=Direction.UP)]
+    assert (len(stops) > 2) == turns

@@ -8,13 +8,12 @@ from __future__ import annotations
 from typing import cast
 
 from services.camera.device import BadLogin, Direction, Locked, Reading, Refused, Reply, Start, Status, Stop, TurnFor
-from services.camera.lanes import GAP_S, same
+from services.camera.lanes import GAP_S, OVERRULES, same
 from services.camera.plan import Plan, ask, attempt, wait
 from services.camera.ptz.skill import Skill
 from services.errors import DeviceError
 
 LOST = 4  # readings after a stop that are unlike the one before: it is not slowing down, the stop had no effect
-OVERRULES = 4  # readings in a row that are as the one before, whatever the camera says of its motion
 REFUSALS = 3
 GRACE_S = 1.0  # a timed move ends so much later than our stop, which is to end it
 LEAST_SHARE = 4  # of 100: less is ignored
