@@ -168,7 +168,7 @@ class Lane:
                 self._answer(waiting, None, error, sent)
             else:
                 self._answer(waiting, result, None, sent)
-        if self.started and stand_still(self.camera, self.clock):
+        if self.started and stand_still(self.camera):
             self.turning(None)
         self.owing(False)
         self.camera.close()
@@ -236,7 +236,7 @@ class Lanes:
 
 def stand_still(
     camera: Camera,
-    clock: Callable[[], float],
+    clock: Callable[[], float] = time.monotonic,
     limit_s: float = END_S,
     *,
     direction: Direction | Literal["drive"] | None = None,

@@ -14,7 +14,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterable
 from types import ModuleType
 from typing import Literal, Protocol, cast
@@ -88,7 +87,7 @@ def connector(name: str, address: Address, gate: Gate) -> Callable[[], Camera]:
     return lambda: connect(address, gate, urgent=next(number) == 0)
 
 
-def watch(lines: Iterable[str], connect: Callable[[], Camera], clock: Callable[[], float] = time.time) -> bool:
+def watch(lines: Iterable[str], connect: Callable[[], Camera]) -> bool:
     """Follows what turns until the lines end, then stops that; whether there was something to stop.
 
     At the first line, which tells that the camera can be reached, it logs in: a stop then needs one request only, and
@@ -104,7 +103,7 @@ def watch(lines: Iterable[str], connect: Callable[[], Camera], clock: Callable[[
     if camera is None:
         return False
     if turning is not None:
-        stand_still(camera, clock, STOP_S, direction=turning)
+        stand_still(camera, limit_s=STOP_S, direction=turning)
     camera.close()
     return turning is not None
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import itertools
 import queue
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Sequence
 
 import pytest
@@ -293,3 +296,38 @@ def test_a_camera_that_refuses_every_stop_stands_where_its_readings_say_so(*, tu
     stops = [request for request in camera.got if isinstance(request, Stop)]
     assert stops[:2] == [Stop(direction=Direction.UP), Stop(every=True, direction=Direction.UP)]
     assert (len(stops) > 2) == turns
+
+
+def test_a_clock_that_is_set_forward_does_not_end_the_stopping() -> None:
+    camera, inbox = Slow(deaf=2), queue.Queue[Message]()
+    camera.leave.set()
+    set_forward = lambda: time.time() + 3600 * sum(isinstance(one, Stop) for one in camera.got)  # noqa: E731
+    sender = Lanes(lambda: camera, inbox.put, set_forward)
+    sender.submit(Start(Direction.LEFT), 1)
+    assert reply(inbox).error is None
+    sender.close()
+    assert not camera.moving
+
+
+WATCHDOG = """
+import time
+seen = []
+time.time = lambda: 1e9 + 3600 * len(seen)
+from services.camera.device import Away, Reading, Stop
+from services.camera.watchdog import watch
+class Deaf:
+    def send(self, request):
+        if isinstance(request, Stop):
+            seen.append(request)
+            if len(seen) < 3:
+                raise Away("no answer")
+        return Reading(1.0, 2.0, 3.0)
+    def close(self):
+        print(len(seen))
+watch(["LEFT"], Deaf)
+"""
+
+
+def test_nor_does_it_end_the_watchdogs() -> None:
+    done = subprocess.run([sys.executable, "-c", WATCHDOG], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout == "3\n"
