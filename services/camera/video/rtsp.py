@@ -134,12 +134,14 @@ def with_password(url: str, address: Address) -> str:
 def _open(url: str) -> av.container.InputContainer:
     av.logging.set_level(None)
     try:
-        container = av.open(url, options=OPTIONS, timeout=(OPEN_S, READ_S))
+        container = av.open(
+            url, options=OPTIONS, timeout=(OPEN_S, READ_S), metadata_errors="replace"
+        )  # in any encoding
     except av.FFmpegError as error:
         raise _translated(error, "cannot be opened") from None
-    if not container.streams.video:
+    if not container.streams.video or container.streams.video[0].codec_context is None:
         container.close()
-        raise Refused("the camera's stream has no picture")
+        raise Refused("the camera's stream has no picture, or none that can be decoded here")
     return container
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -10,7 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from services.camera.device import Away, BadLogin, DeviceError
+from services.camera.device import Away, BadLogin, DeviceError, Refused
 from services.camera.video.newest import Frame, Newest, Upright
 from services.camera.video.reader import Reader
 from services.camera.video.rtsp import Rtsp, with_password
@@ -157,3 +158,46 @@ def test_no_password_appears_in_logs_and_errors(
 def test_user_and_password_are_percent_encoded_in_the_address_for_ffmpeg() -> None:
     url = with_password("rtsp://192.0.2.9:554/cam/realmonitor?channel=1&subtype=0", address())
     assert url == "rtsp://ros:p%40ss%2Fw%3Ard%231%2B@192.0.2.9:554/cam/realmonitor?channel=1&subtype=0"
+
+
+def described(line: str, title: str = "s=Kueche") -> str:
+    return f"v=0\r\no=- 0 0 IN IP4 0.0.0.0\r\n{title}\r\nt=0 0\r\nm=video 0 RTP/AVP {line}\r\na=control:one\r\n"
+
+
+@contextmanager
+def describing(description: bytes) -> Iterator[str]:
+    """A camera that describes its stream so, and ends before the first picture; its address."""
+    lines = {
+        "DESCRIBE": f"Content-Type: application/sdp\r\nContent-Length: {len(description)}\r\n",
+        "SETUP": "Session: 7\r\nTransport: RTP/AVP/TCP;unicast;interleaved=0-1\r\n",
+        "PLAY": "Session: 7\r\n",
+    }
+
+    def answer() -> None:
+        connection, _ = server.accept()
+        with connection, connection.makefile("rwb") as stream:
+            for verb in ("OPTIONS", *lines):
+                asked = [line.rstrip() for line in iter(stream.readline, b"\r\n")]
+                number = next(line for line in asked if line.startswith(b"CSeq")).decode()
+                stream.write(f"RTSP/1.0 200 OK\r\n{number}\r\n{lines.get(verb, '')}\r\n".encode())
+                stream.write(description if verb == "DESCRIBE" else b"")
+                stream.flush()
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=answer)
+        thread.start()
+        yield f"rtsp://127.0.0.1:{server.getsockname()[1]}/x"
+        thread.join()
+
+
+def test_a_stream_may_have_a_title_in_any_encoding() -> None:
+    with describing(described("26", title="s=Küche").encode("latin-1")) as url:
+        session = Rtsp(url, address())
+        assert session.codec == "mjpeg"
+        session.close()
+
+
+def test_a_picture_that_nobody_can_decode_is_none() -> None:
+    description = described("96\r\na=rtpmap:96 TOMORROW/90000").encode()
+    with describing(description) as url, pytest.raises(Refused, match="decoded"):
+        Rtsp(url, address())
