@@ -14,13 +14,23 @@ from hypothesis import strategies as st
 from pydantic import SecretStr
 
 from services.camera.address import Address
-from services.camera.brands.onvif import PTZ, Onvif, Profile, position, read_presets, read_reading
-from services.camera.device import Away, BadLogin, Locked, Reading, Refused, Status
+from services.camera.brands.onvif import (
+    MEDIA,
+    PTZ,
+    Onvif,
+    Profile,
+    position,
+    read_capabilities,
+    read_presets,
+    read_reading,
+)
+from services.camera.device import Away, BadLogin, FindStream, Locked, Reading, Refused, Status, StreamAddress
 from services.camera.web.gate import Gate
-from services.camera.web.soap import FIRST, Soap, envelope, read_envelope, token
+from services.camera.web.soap import DEVICE, FIRST, SCHEMA, Soap, envelope, read_envelope, token
 
 ADDRESS = Address("http://192.0.2.10", "admin", SecretStr("secret123"))
 NOW = 1_768_000_000.0
+SPACES = {"media": MEDIA, "ptz": PTZ, "events": "http://www.onvif.org/ver10/events/wsdl"}
 GENERIC = Profile("p", (-1.0, 1.0), (-1.0, 1.0), (0.0, 1.0))
 
 
@@ -168,3 +178,61 @@ def test_a_preset_has_the_number_of_our_name_and_that_of_its_token() -> None:
     )
     found = read_presets(read_envelope(200, envelope("", f"<a>{told}</a>")))
     assert found == {1: "1", 3: "12", 4: "preset-a", 12: "12"}
+
+
+def services(**where: str) -> bytes:
+    told = "".join(
+        f"<Service><Namespace>{SPACES[name]}</Namespace><XAddr>{at}</XAddr></Service>" for name, at in where.items()
+    )
+    return envelope("", f'<GetServicesResponse xmlns="{DEVICE}">{told}</GetServicesResponse>')
+
+
+@pytest.mark.parametrize(
+    "where", ["http://[fe80::1/media", "http://192.0.2.10/med\x7fia", "http://192.0.2.10/" + 70000 * "a"]
+)
+def test_a_service_at_no_address_is_away_once_it_is_needed(where: str) -> None:
+    camera = Onvif(ADDRESS, Gate(), httpx.MockTransport(Device(clock(3), services(events=where))))
+    with pytest.raises(Refused, match="does not offer"):
+        camera.send(Status())
+    camera = Onvif(ADDRESS, Gate(), httpx.MockTransport(Device(clock(3), services(media=where))))
+    for _ in range(2):
+        with pytest.raises(Away, match="expected an address"):
+            camera.send(Status())
+
+
+def profiles(node: str) -> str:
+    motors = f'<PTZConfiguration xmlns="{SCHEMA[1:-1]}"><NodeToken>{node}</NodeToken></PTZConfiguration>'
+    return f'<a xmlns="{MEDIA}"><Profiles token="p">{motors}</Profiles></a>'
+
+
+def test_motors_without_a_name_are_none() -> None:
+    answers = clock(3), services(media="http://10.0.0.9/media"), envelope("", profiles(""))
+    with pytest.raises(Refused, match="no ONVIF profile with motors"):
+        Onvif(ADDRESS, Gate(), httpx.MockTransport(Device(*answers))).send(Status())
+
+
+@pytest.mark.parametrize(
+    ("uri", "told"),
+    [
+        ("rtsp://10.0.0.9:554/cam?channel=1", "rtsp://192.0.2.10:554/cam?channel=1"),
+        ("rtsp://10.0.0.9//[cam/", "rtsp://192.0.2.10:554/[cam/"),
+        ("cam:[1", "rtsp://192.0.2.10:554/[1"),
+        ("", "rtsp://192.0.2.10:554/"),
+        ("rtsp://[10.0.0.9/cam", Away),
+    ],
+)
+def test_the_stream_is_on_the_host_that_is_configured_wherever_the_camera_says(uri: str, told: str | type) -> None:
+    at = services(media="http://10.0.0.9/media", ptz="http://10.0.0.9/ptz")
+    stream = f'<a><Uri xmlns="{SCHEMA[1:-1]}">{uri}</Uri></a>'
+    answers = clock(3), at, *(envelope("", one) for one in (profiles("n"), "<node/>", stream))
+    camera = Onvif(ADDRESS, Gate(), httpx.MockTransport(Device(*answers)))
+    if isinstance(told, str):
+        assert camera.send(FindStream("main")) == StreamAddress(told)
+    else:
+        with pytest.raises(told, match="expected an address"):
+            camera.send(FindStream("main"))
+
+
+def test_a_number_of_presets_that_is_none_is_none() -> None:
+    node = f'<a xmlns="{SCHEMA[1:-1]}"><MaximumNumberOfPresets>²</MaximumNumberOfPresets></a>'
+    assert read_capabilities(ElementTree.fromstring(node)).presets == 0

@@ -112,17 +112,17 @@ class Onvif:
         if service not in self._paths:
             told = self._ask(DEVICE, "GetServices", "<IncludeCapability>false</IncludeCapability>")
             for one in told.iterfind(f"{{{DEVICE}}}Service"):
-                where = _local(one.findtext(f"{{{DEVICE}}}XAddr") or "")
+                where = one.findtext(f"{{{DEVICE}}}XAddr") or ""
                 self._paths.setdefault(one.findtext(f"{{{DEVICE}}}Namespace") or "", where)
         if service not in self._paths:
             raise Refused(f"the camera does not offer {service}")
-        return self._paths[service]
+        return _local(self._paths[service])
 
     def _known_profile(self) -> Profile:
         """The first profile with motors."""
         if self._profile is None:
             told = self._ask(MEDIA, "GetProfiles").iterfind(f"{{{MEDIA}}}Profiles")
-            mine = next((one for one in told if one.find(f"{SCHEMA}PTZConfiguration") is not None), None)
+            mine = next((one for one in told if one.findtext(f"{SCHEMA}PTZConfiguration/{SCHEMA}NodeToken")), None)
             if mine is None:
                 raise Refused("the camera has no ONVIF profile with motors")
             self._node_token = mine.findtext(f"{SCHEMA}PTZConfiguration/{SCHEMA}NodeToken") or ""
@@ -216,7 +216,7 @@ def read_capabilities(node: Element) -> Capabilities:
     kinds = {one.tag.removeprefix(SCHEMA) for one in node.iterfind(f".//{SCHEMA}SupportedPTZSpaces/*")}
     most = node.findtext(f".//{SCHEMA}MaximumNumberOfPresets") or ""
     return Capabilities(
-        presets=int(most) if most.isdigit() else 0,
+        presets=int(most) if most.isdecimal() else 0,
         absolute="AbsolutePanTiltPositionSpace" in kinds,
         relative="RelativePanTiltTranslationSpace" in kinds,
         timed="ContinuousPanTiltVelocitySpace" in kinds,
@@ -275,9 +275,14 @@ def _token(tag: str, text: str) -> str:
 
 
 def _local(uri: str) -> str:
-    """Path and query of an address."""
-    parts = urlsplit(uri)
-    return f"{parts.path}?{parts.query}" if parts.query else parts.path
+    """Path and query of an address; Away when it is none."""
+    try:
+        parts = urlsplit(uri)
+        local = f"/{parts.path.lstrip('/')}{'?' if parts.query else ''}{parts.query}"
+        httpx.URL(local)
+    except (ValueError, httpx.InvalidURL) as error:
+        raise Away(f"expected an address from the camera, got {uri[:80]!r}") from error
+    return local
 
 
 def _number(node: Element, key: str) -> float:
