@@ -6,7 +6,8 @@
     ├── Unavailable   something we need is down: nothing is acknowledged or taken, the turn is tried again
     └── ConfigError   the configuration cannot be used: before the start only, all faults at once, exit 2
 
-Anything else is a bug: the runner acknowledges nothing and the process ends with 1 (`runner.py`).
+Anything else is a bug: the runner acknowledges nothing and the process ends with 1 (`runner.py`), in whatever thread it
+comes up (`process.py`).
 """
 
 from __future__ import annotations

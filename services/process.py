@@ -89,6 +89,7 @@ def client_id(settings: BusSettings, name: str, state: Path) -> str:
 def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
     """Runs services until SIGTERM or SIGINT, each in a thread of its own; a bug in one ends all and comes out as it is.
 
+    So does one in any other thread: a camera whose thread for control is gone could not be stopped any more.
     `ready` is told once, when the last of them hears what it subscribed to.
     """
     if os.environ.get(SUPERVISED):
@@ -102,15 +103,18 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
         if len(addresses) == len(names):
             ready(addresses[name] if len(names) == 1 else {"services": addresses})
 
-    stopping, asked = threading.Event(), deque[bool]()
-    with stop_signals(lambda: asked.append(True)), ThreadPoolExecutor(len(names)) as pool:
+    stopping, asked, died = threading.Event(), deque[bool](), deque[Exception]()
+    with stop_signals(lambda: asked.append(True)), _deaths(died.append), ThreadPoolExecutor(len(names)) as pool:
         instances = [apartment.instances[name] for name in names]
         futures = [pool.submit(_one, apartment, instance, stopping, one_is_ready) for instance in instances]
-        while not asked and not wait(futures, timeout=SIGNAL_S, return_when=FIRST_COMPLETED).done:
+        while not asked and not died and not wait(futures, timeout=SIGNAL_S, return_when=FIRST_COMPLETED).done:
             pass
+        why = next(iter(died), None)
         stopping.set()
         for future in futures:
             future.result()
+        if why is not None:
+            raise why
 
 
 def _one(apartment: Apartment, instance: Instance, stopping: threading.Event, ready: OneReady) -> None:
@@ -237,6 +241,23 @@ def stop_signals(stop: Callable[[], None]) -> Iterator[None]:
     yield
     if interrupted:
         raise KeyboardInterrupt
+
+
+@contextmanager
+def _deaths(tell: Callable[[Exception], None]) -> Iterator[None]:
+    """Calls `tell` for every thread that ends by an error that nobody there expects; its story is in the log."""
+
+    def hook(args: threading.ExceptHookArgs) -> None:
+        if isinstance(args.exc_value, Exception):  # no SystemExit: by that a thread ends in good order
+            name = args.thread.name if args.thread is not None else "that is gone"
+            log.error("the thread %s ends by a fault of its own", name, exc_info=args.exc_value)
+            tell(args.exc_value)
+
+    before, threading.excepthook = threading.excepthook, hook
+    try:
+        yield
+    finally:
+        threading.excepthook = before
 
 
 def _end_with_parent() -> None:

@@ -46,6 +46,30 @@ signal.pause()
 """
 
 
+HAS_A_THREAD = """
+import os, signal, sys, threading
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from services import process
+from services.apartment.home import Home
+from services.config import Apartment, BusSettings, Instance
+from services.registry import Row
+from services.section import Section
+
+@contextmanager
+def start(config):
+    threading.Thread(target=lambda: 1 / int(sys.argv[1]) and sys.exit(), name="lane").start()
+    yield SimpleNamespace(addresses={})
+    print("in good order")
+
+process.log_to_stderr()
+instance = Instance("odd", Row("odd", "__main__", (), "it has a thread", on_bus=False), Section())
+where = Apartment(Path("-"), BusSettings(), Home(items={}), Path("-"), (), instances={"odd": instance})
+process.serve(where, ["odd"], lambda ready: os.kill(os.getpid(), signal.SIGTERM) if int(sys.argv[1]) else None)
+"""
+
+
 @pytest.mark.parametrize(
     ("walls", "told"),
     [
@@ -141,3 +165,14 @@ def test_what_others_need_ends_after_them(tmp_path: Path) -> None:
     with in_background(Supervisor(lines, last={"simulated-camera"})):
         pass
     assert (service.read_text(), camera.read_text()) == ("sooner", "later")
+
+
+def test_a_thread_that_nobody_expects_to_end_ends_its_process_in_good_order_and_with_an_error() -> None:
+    done = [
+        subprocess.run([sys.executable, "-c", HAS_A_THREAD, divisor], capture_output=True, text=True, timeout=20)
+        for divisor in ("0", "1")
+    ]
+    assert [one.returncode for one in done] == [1, 0]
+    assert [one.stdout for one in done] == ["in good order\n", "in good order\n"]
+    assert "the thread lane ends by a fault of its own\nTraceback" in done[0].stderr
+    assert done[1].stderr == ""
