@@ -24,6 +24,7 @@ MARGIN_S = 0.5  # so that the gate is open when it is asked again
 PATIENCE = 2  # failures of the best way before another one is tried
 BETTER_S = 300.0  # so long a worse way is used before the best one is tried again
 HOPELESS_S = 5.0  # a lag that a new connection takes away
+SET_S = 0.1  # by so much our clock was set (ntpd: from 0.128 s on); slewed, the steady one goes along
 RATE_S = 2.0  # frame rate and bit rate are of so long
 END_S = 1.0  # a thread that waits for the camera ends within its read timeout; nobody else waits so long
 
@@ -61,12 +62,14 @@ class Reader:
         latency: tuple[float, float],
         login_retry_s: float = 120.0,
         clock: Callable[[], float] = time.time,
+        steady: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name = name
         self.newest = newest
         self.latency = latency
         self.login_retry_s = login_retry_s
         self.clock = clock
+        self.steady = steady  # nobody sets this one
         self.flow = Flow()
         self._ways: tuple[Opener, ...] = ()
         self._closing = False
@@ -113,17 +116,27 @@ class Reader:
 
     def _read(self, way: Opener, ways: tuple[Opener, ...]) -> None:
         session = way()
-        relation = StreamClock(*self.latency)
-        began = self.clock()
+        relation, ahead = StreamClock(*self.latency), self._ahead()
+        began = self.steady()
         self.flow.connections += 1
         try:
             while self._ways is ways and relation.lag < HOPELESS_S:
-                self._take(session.read(decode=self.newest.wanted), relation)
+                arrival = session.read(decode=self.newest.wanted)
+                set_s = self._ahead() - ahead
+                if abs(set_s) > SET_S:  # perhaps after this picture was given its time
+                    log.info("%s: our clock was set by %+.1f s", self.name, set_s)
+                    relation, ahead = StreamClock(*self.latency), ahead + set_s
+                    continue
+                self._take(arrival, relation)
                 self._is_there(session.name)
-                if way is not ways[0] and self.clock() - began > BETTER_S:
+                if way is not ways[0] and self.steady() - began > BETTER_S:
                     return
         finally:
             session.close()
+
+    def _ahead(self) -> float:
+        """How far our clock is before the steady one. Whoever is held up between two looks sees less: seldom twice."""
+        return max(self.clock() - self.steady() for _ in range(2))
 
     def _take(self, arrival: Arrival, relation: StreamClock) -> None:
         flow = self.flow

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from services.camera.device import Away, BadLogin
-from services.camera.video.newest import Newest, Upright
+from services.camera.video.newest import Frame, Newest, Upright
 from services.camera.video.reader import Reader
 from services.camera.video.session import Arrival, Session
 from services.camera.web.motion_jpeg import split
@@ -84,6 +84,53 @@ def test_a_refused_login_is_not_tried_again_soon(reader: Reader) -> None:
     with pytest.raises(TimeoutError):
         wait_until(lambda: len(opened) > 1, "a second attempt", 3)
     assert reader.flow.trouble == "wrong"
+
+
+class Clocked(Session):
+    """Forty seconds of pictures that arrive as they are exposed, by clocks of its own; ours is set in between.
+
+    `late`: that happens after the picture's arrival was noted, while it is decoded.
+    """
+
+    name = "rtsp"
+
+    def __init__(self, step_s: float, *, late: bool) -> None:
+        self.step_s, self.late = step_s, late
+        self.wall, self.steady = 1.7e9, 50.0
+        self.number = 0
+        self.ended = threading.Event()
+
+    def read(self, *, decode: bool) -> Arrival:
+        self.number += 1
+        if self.number > 600:
+            self.ended.set()
+            raise Away("it has ended")
+        self.wall, self.steady = self.wall + 1 / 15, self.steady + 1 / 15
+        noted = self.wall
+        if self.number == 300:
+            self.wall += self.step_s
+            noted = noted if self.late else self.wall
+        return Arrival(noted, 1000, self.number / 15, lambda: np.zeros((2, 2, 3), np.uint8))
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("step_s", [3.0, 0.4, -0.4, -3.0, -3600.0])
+def test_when_our_clock_is_set_pictures_keep_their_time_of_exposure(step_s: float, late: bool) -> None:
+    film = Clocked(step_s, late=late)
+    reader = Reader("ip1", Newest(Upright()), (0.3, 0.1), clock=lambda: film.wall, steady=lambda: film.steady)
+    seen: list[tuple[Frame, float]] = []
+    with reader.newest.tapped(lambda frame: seen.append((frame, film.wall))):
+        reader.switch((lambda: film,))
+        assert film.ended.wait(20)
+        reader.close()
+    wrong = [(frame.number, frame.exposure.at - (now - 0.3)) for frame, now in seen]
+    assert [one for one in wrong if abs(one[1]) > 0.01] == []
+    assert len(seen) >= 599, "the one that came as the clock was set is in doubt"
+    assert seen[-1][0].exposure.uncertainty == 0.1
+    assert not reader.flow.queueing
 
 
 def parts(*jpegs: bytes, length: Callable[[bytes], str] = lambda jpeg: f"Content-Length: {len(jpeg)}\r\n") -> bytes:
