@@ -41,7 +41,10 @@ class Feed:
         self.channel = channel
         self.upright = Upright(config.picture.flip, config.picture.mirror, config.kind)
         self.say = say
+        self._settled: dict[str, bool] = {}  # as each stream was before the orders that are under way
+        self._newest: dict[str, orders.Broadcast] = {}  # of each stream; only that one undoes what it has done
         if channel is not None:
+            self._settled = {"rtsp": channel.rtsp, "mjpeg": channel.mjpeg}
             channel.newest.upright = self.upright
             channel.reachable = lambda: health.online
         self._shooting = False
@@ -56,19 +59,20 @@ class Feed:
     def switch(self, order: orders.Broadcast, now: float) -> Plan[None]:
         """RTSP and MJPEG, on or off. On is done when a picture is there; without one it is as it was."""
         channel = self._channel()
-        before = channel.rtsp, channel.mjpeg
-        if not (order.rtsp or order.mjpeg):
-            return channel.switch(rtsp=order.rtsp, mjpeg=order.mjpeg)
-        channel.open()
-        if not channel.url:
-            raise Refused("the port of the stream is taken: see stream.port in the configuration")
-        channel.switch(rtsp=order.rtsp, mjpeg=order.mjpeg)
+        wanted = {key: on for key, on in vars(order).items() if on is not None}
+        if any(wanted.values()):
+            channel.open()
+            if not channel.url:
+                raise Refused("the port of the stream is taken: see stream.port in the configuration")
+        self._newest |= dict.fromkeys(wanted, order)
+        channel.switch(**wanted)
         try:
-            yield from self._first_picture(channel, order, now)
+            if any(wanted.values()):
+                yield from self._first_picture(channel, order, now)
         except DeviceError:
-            channel.switch(rtsp=before[0] if order.rtsp else None, mjpeg=before[1] if order.mjpeg else None)
+            channel.switch(**{key: self._settled[key] for key in wanted if self._newest[key] is order})
             raise
-        return None
+        self._settled |= {key: channel.is_on(key.upper()) for key in wanted}
 
     def lasting(self, now: float) -> Iterable[Plan[None]]:
         """The plans that go on as long as the service does."""

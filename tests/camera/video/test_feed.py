@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,24 +11,30 @@ import numpy as np
 import pytest
 
 from services.bus import Message
-from services.camera.device import Away, Picture, Reply, Snapshot
+from services.camera.device import Away, Picture, Reply, Request, Snapshot, StreamAddress
 from services.camera.health import Health
-from services.camera.plan import Until
+from services.camera.orders import Broadcast
+from services.camera.plan import Run, Stage, Until
 from services.camera.settings import Config
 from services.camera.upkeep import Facts
 from services.camera.video import pictures
-from services.camera.video.feed import Feed
+from services.camera.video.channel import Channel
+from services.camera.video.feed import START_S, Feed
+from services.camera.web.gate import Gate
 
 BROKEN = "expected a whole JPEG"
 IMAGE = np.tile(np.linspace(0, 255, 320, dtype=np.uint8)[None, :, None], (240, 1, 3))
 JPEG = pictures.encode(IMAGE)
 
 
-def feed(said: list[Message], **snapshot: Any) -> Feed:
-    config = Config.model_validate({"url": "http://192.0.2.9", "folder": Path(), "snapshot": snapshot})
+CONFIG = Config.model_validate({"url": "http://192.0.2.9", "folder": Path()})
+
+
+def feed(said: list[Message], channel: Channel | None = None, **snapshot: Any) -> Feed:
+    config = Config.model_validate({**dict(CONFIG), "snapshot": snapshot})
     health = Health("ip1")
     health.state = "online"
-    return Feed(config, health, Facts(), None, said.append)
+    return Feed(config, health, Facts(), channel, said.append)
 
 
 def reply(error: Away | None = None, at: float = 101.0, data: bytes = JPEG) -> Reply:
@@ -134,3 +141,90 @@ def test_snapshots_are_upright() -> None:
     shown = pictures.decode(said[0].payload)
     assert shown[0, 0, 0] > 200
     assert shown[0, -1, 0] < 50
+
+
+class Switchboard:
+    """Orders for the streams of a camera that is slow to say where they are, and then has none and no picture."""
+
+    def __init__(self, channel: Channel) -> None:
+        self.now = 1000.0
+        self.channel = channel
+        self.feed = feed([], channel)
+        self.asked: list[tuple[Request, int]] = []
+        self.stage = Stage(lambda request, ticket: self.asked.append((request, ticket)))
+        self.runs: list[Run] = []
+
+    def order(self, **on: bool) -> None:
+        self.runs.append(self.stage.begin(self.feed.switch(Broadcast(**on), self.now), self.now, lambda run, now: None))
+
+    def run(self, seconds: float, picture: bytes | None = None) -> None:
+        for _ in range(round(seconds * 10)):
+            self.now += 0.1
+            asked, self.asked = self.asked, []
+            for request, ticket in asked:
+                good = isinstance(request, Snapshot) and picture is not None
+                error = None if good else Away("no answer")
+                self.stage.reply(Reply(request, ticket, picture, error, self.now, self.now), self.now)
+            self.stage.tick(self.now)
+
+    @property
+    def ends(self) -> list[str]:
+        return ["runs" if not run.done else str(run.error or "done") for run in self.runs]
+
+
+@pytest.fixture(params=[False, True])
+def switchboard(request: pytest.FixtureRequest) -> Iterator[Switchboard]:
+    """The stream was off, or on from the start, before anything is ordered."""
+    stream = CONFIG.stream.model_copy(update={"rtsp": request.param})
+    with closing(Channel("ip1", stream, CONFIG.address, CONFIG.kind, lambda message: None, Gate())) as channel:
+        yield Switchboard(channel)
+
+
+def test_a_stream_that_is_switched_off_stays_off_however_often_it_was_switched_on(switchboard: Switchboard) -> None:
+    switchboard.order(rtsp=True)
+    switchboard.order(rtsp=True)
+    switchboard.order(rtsp=False)
+    switchboard.run(2 * START_S)
+    assert switchboard.ends == ["it was switched off again"] * 2 + ["done"]
+    assert not switchboard.channel.rtsp
+
+
+def test_a_stream_that_gives_no_picture_is_as_it_was_before_however_often_it_was_switched_on(
+    switchboard: Switchboard,
+) -> None:
+    before = switchboard.channel.rtsp
+    switchboard.order(rtsp=True)
+    switchboard.run(5)
+    switchboard.order(rtsp=True)
+    switchboard.run(START_S - 4)
+    assert switchboard.ends[1] == "runs", "the second one has its own time"
+    assert switchboard.channel.rtsp
+    switchboard.run(START_S)
+    assert all("no picture" in end for end in switchboard.ends)
+    assert switchboard.channel.rtsp is before
+
+
+def test_an_order_that_fails_leaves_the_stream_to_the_one_that_came_after_off(switchboard: Switchboard) -> None:
+    switchboard.order(rtsp=True)
+    switchboard.run(5)
+    switchboard.order(rtsp=False)
+    switchboard.order(rtsp=True)
+    switchboard.run(START_S - 4)
+    assert switchboard.channel.rtsp
+    switchboard.run(START_S)
+    assert "no picture" in switchboard.ends[2]
+    assert not switchboard.channel.rtsp
+
+
+def test_a_stream_that_has_given_a_picture_stays_on(switchboard: Switchboard) -> None:
+    switchboard.channel.begin(StreamAddress(None))
+    switchboard.order(rtsp=True)
+    switchboard.run(3, JPEG)
+    assert switchboard.ends == ["done"]
+    switchboard.order(rtsp=True)
+    switchboard.run(2 * START_S)
+    assert "no picture" in switchboard.ends[1]
+    assert switchboard.channel.rtsp
+    switchboard.order(mjpeg=True)
+    switchboard.run(2 * START_S)
+    assert (switchboard.channel.rtsp, switchboard.channel.mjpeg) == (True, False)
