@@ -219,7 +219,7 @@ class CameraService:
     def _read(self, read: topics.Read, now: float) -> None:
         payload = read.payload
         if read.topic is topics.CAMERA_SNAPSHOT_GET:
-            self._begin(self.feed.published(), now)
+            self._begin(self.feed.on_request(), now)
         elif read.topic in ENTITY_TOPICS:
             self.discovery.hear(read)
         elif isinstance(payload, ScanResult):

@@ -7,7 +7,7 @@ import queue
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from services import camera as real
 from services import simulators
 from services.bus import Message
 from services.camera.service import CameraService
+from services.errors import BadMessage
 from services.simulators import camera as simulated
 from services.simulators.world import World, load
 
@@ -48,7 +49,8 @@ class Bench:
         except queue.Empty:
             pass
         else:
-            self.said += self.service.handle(message, time.time())
+            with suppress(BadMessage):
+                self.said += self.service.handle(message, time.time())
         self.said += self.service.tick(time.time())
 
     def order(self, key: str, value: Any, order_id: str) -> None:

@@ -11,7 +11,18 @@ import pytest
 from services import payloads
 from services.bus import Message
 from services.camera.capabilities import Capabilities, GetCapabilities
-from services.camera.device import Away, BadLogin, Direction, MoveOver, MoveTo, SetPicture, Start, Status, Stop
+from services.camera.device import (
+    Away,
+    BadLogin,
+    Direction,
+    MoveOver,
+    MoveTo,
+    SetPicture,
+    Snapshot,
+    Start,
+    Status,
+    Stop,
+)
 from services.camera.scan.modes import Before
 from services.errors import BadMessage
 from services.topics import read
@@ -485,6 +496,33 @@ def test_orders_are_refused_while_the_camera_is_away_and_it_is_asked_ever_less_o
     before = flat.service.counters["requests"]
     flat.run(100)
     assert 5 <= flat.service.counters["requests"] - before <= 12
+
+
+def snapshots(flat: Flat) -> int:
+    """How many the camera has been asked for and has not given yet."""
+    waiting = [request for request, _ in flat.camera.waiting] + [flying[2] for flying in flat.camera.flying]
+    return sum(isinstance(request, Snapshot) for request in waiting)
+
+
+def test_snapshots_are_not_asked_for_while_the_camera_is_away_nor_when_it_is_back(flat: Flat) -> None:
+    flat.camera.away = Away("no answer from the camera")
+    flat.run(30)
+    for _ in range(60):
+        with pytest.raises(BadMessage, match="snapshot/get: refused, the camera is offline: no answer"):
+            flat.send("camera/ip1/snapshot/get", b"now")
+    assert snapshots(flat) == 0
+    flat.camera.away = None
+    flat.online()
+    assert snapshots(flat) == 0
+
+
+def test_one_snapshot_at_a_time_is_asked_for(flat: Flat) -> None:
+    for _ in range(60):
+        flat.send("camera/ip1/snapshot/get", b"now")
+    assert snapshots(flat) == 1
+    flat.until(lambda: snapshots(flat) == 0)
+    flat.send("camera/ip1/snapshot/get", b"now")
+    assert snapshots(flat) == 1
 
 
 def test_an_order_before_the_camera_was_met_waits_for_that(just_started: Flat) -> None:

@@ -20,8 +20,8 @@ from services.camera.video import pictures
 from services.camera.video.channel import Channel
 from services.camera.video.newest import Upright
 from services.camera.video.spoilt import Spoilt
-from services.errors import DeviceError
-from services.topics import CAMERA_SNAPSHOT
+from services.errors import BadMessage, DeviceError
+from services.topics import CAMERA_SNAPSHOT, CAMERA_SNAPSHOT_GET
 
 START_S = 15.0  # an order to switch on fails when no picture has come until then
 STEP_S = 0.1
@@ -47,7 +47,7 @@ class Feed:
             self._settled = {"rtsp": channel.rtsp, "mjpeg": channel.mjpeg}
             channel.newest.upright = self.upright
             channel.reachable = lambda: health.online
-        self._shooting = False
+        self._shooting = self._asked = False
         self._motion = 0
 
     def check(self, order: orders.Broadcast) -> None:
@@ -103,6 +103,13 @@ class Feed:
         data = yield from self._upright()
         self.say(CAMERA_SNAPSHOT.message(data, cam=self.config.name))
 
+    def on_request(self) -> Plan[None]:
+        """A snapshot for who asks on the bus; one under way is for him, too. BadMessage while there is none."""
+        if not self.health.online:
+            topic = CAMERA_SNAPSHOT_GET.name(cam=self.config.name)
+            raise BadMessage(f"{topic}: refused, the camera is {self.health.state}: {self.health.reason}")
+        return self._requested()
+
     def at_motion(self, value: int) -> Plan[None]:
         """A snapshot when motion begins (the value becomes 1), where that is configured."""
         began, self._motion = value == 1 and self._motion != 1, value
@@ -130,6 +137,14 @@ class Feed:
         self.upright = Upright(picture.flip, picture.mirror, self.upright.kind)
         if self.channel is not None:
             self.channel.newest.upright = self.upright
+
+    def _requested(self) -> Plan[None]:
+        if not self._asked:
+            self._asked = True
+            try:
+                yield from self.published()
+            finally:
+                self._asked = False
 
     def _has_time(self) -> bool:
         return self.health.online and not self.health.moving

@@ -1,4 +1,4 @@
-"""Snapshots on occasion, as plans: no camera and no clock."""
+"""Snapshots on occasion and orders for the streams, as plans: no camera and no clock."""
 
 from __future__ import annotations
 
@@ -128,6 +128,23 @@ def test_another_snapshot_is_asked_for_until_they_are_good_again() -> None:
     assert plan.send(1030.0) == Snapshot()
     assert plan.send(reply()) == Until(1040.0)
     assert plan.send(1040.0) == Until(1050.0)
+
+
+def test_who_asks_while_a_snapshot_is_under_way_gets_that_one() -> None:
+    said: list[Message] = []
+    here = feed(said)
+    for _ in range(2):
+        first, others = here.on_request(), [here.on_request() for _ in range(3)]
+        assert next(first) == Snapshot()
+        assert [next(other, None) for other in others] == [None] * 3
+        with pytest.raises(StopIteration):
+            first.send(reply())
+    assert len(said) == 2
+    failed = here.on_request()
+    next(failed)
+    with pytest.raises(Away):
+        failed.send(reply(Away("busy")))
+    assert next(here.on_request()) == Snapshot(), "it was not to be had; the next one is asked for again"
 
 
 def test_snapshots_are_upright() -> None:
