@@ -20,6 +20,13 @@ class GetMotion(Errand):
 
 
 @dataclass(frozen=True)
+class GetMotionHold(Errand):
+    """How long the camera holds a motion that is over, seconds (its anti-dither); the answer is a float."""
+
+    code: str = "VideoMotion"
+
+
+@dataclass(frozen=True)
 class GetClock(Errand):
     """What the camera's clock shows: a datetime without a zone, in the camera's own, to the second."""
 

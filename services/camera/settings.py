@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, Literal
 from zoneinfo import available_timezones
@@ -52,6 +53,14 @@ class MotionSettings(Section):
     codes: tuple[str, ...] = ("VideoMotion",)  # the camera's words; SmartMotionHuman and others where it has them
     hold_s: float = Field(default=15.0, gt=0, le=600)
     heartbeat_s: Literal[1, 2, 3, 4] = 3  # silence of 3.25 of them has to be noticed within 15 s
+
+    @field_validator("codes")
+    @classmethod
+    def are_names(cls, codes: tuple[str, ...]) -> tuple[str, ...]:
+        for code in codes or ("",):  # All would be the clock and the memory card, too
+            if code.lower() == "all" or re.fullmatch(r"\w+", code) is None:
+                raise ValueError(f"expected names of what is motion, such as VideoMotion, got {code[:80]!r}")
+        return codes
 
 
 class ClockSettings(Section):

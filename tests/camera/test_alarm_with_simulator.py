@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -71,6 +72,25 @@ def test_a_camera_that_hangs_is_noticed_and_comes_back_by_itself(here: Bench) ->
     here.until(lambda: value(here) == 0, 30)
     here.tell("event", code="VideoMotion", action="Start")
     here.until(lambda: value(here) == 1, 5)
+
+
+def test_who_walks_in_while_the_camera_turns_and_goes_on_moving_is_told_after_it(here: Bench) -> None:
+    here.look("1", pan=100.0, tilt=20.0)
+    here.until(lambda: here.truth()["moving"], 10)
+    here.tell("stir", seconds=60)
+    assert here.end_of("1", 30)["state"] == "done"
+    assert value(here) == 0
+    here.until(lambda: value(here) == 1, 15)
+
+
+def test_turns_in_an_empty_flat_are_no_motion_afterwards_either(here: Bench) -> None:
+    for number, pan in enumerate((100.0, 220.0)):
+        here.look(str(number), pan=pan, tilt=20.0)
+        assert here.end_of(str(number), 30)["state"] == "done"
+    end = time.monotonic() + 12.0
+    here.until(lambda: time.monotonic() > end, 20)
+    assert {one["value"] for one in here.payloads("motion")} == {0}
+    assert here.service.motion.masked >= 1
 
 
 def test_the_end_does_not_wait_for_the_camera(tmp_path: Path, camera: simulated.Simulated) -> None:

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
-from services.camera.alarm.listener import Heard
+from services.bus import Message
+from services.camera.alarm.listener import HEARD, Heard
 from services.camera.alarm.motion import MotionWatch
 from services.camera.device import Away, Event, Refused, Reply, Request
 from services.camera.errands import GetMotion
 from services.camera.plan import Plan, Run, Stage
+from services.camera.scan.modes import Before
 from services.errors import DeviceError
+from tests.camera.flat import Flat
 
 START, STOP, BEAT = Event("VideoMotion", "Start"), Event("VideoMotion", "Stop"), Event("", "Heartbeat")
 
@@ -116,6 +121,28 @@ def test_what_the_camera_sees_while_it_turns_is_no_motion_and_for_2_s_after() ->
     assert (room.values, room.watch.masked) == ([0], 2)
     room.hear(START)
     assert room.values == [0, 1]
+
+
+def test_a_picture_that_is_put_back_after_a_scan_is_no_motion(tmp_path: Path) -> None:
+    flat = Flat(tmp_path).online()
+    flat.service.motion.on = True
+
+    def hear(**heard: Any) -> list[int]:
+        flat.inbox.append(Message(HEARD, value=Heard(flat.now, **heard)))
+        flat._turn()
+        return [one["value"] for one in flat.payloads("motion")][1:]  # the first is of an alarm that was off
+
+    assert hear(attached=True) == [0]
+    flat.run(2.0)
+    modes = flat.service.scanner.modes
+    modes.noted, modes.changed = Before("bw"), True
+    flat.service.stage.begin(flat.service.scanner.restored(), flat.now, lambda run, now: None)
+    flat._turn()
+    flat.until(lambda: flat.camera.picture.mode == "bw")
+    assert hear(events=(START,)) == [0]
+    assert hear(events=(STOP,)) == [0]
+    flat.run(3.0)
+    assert hear(events=(START,)) == [0, 1]
 
 
 def test_motion_from_before_a_turn_still_counts() -> None:

@@ -39,6 +39,14 @@ def test_a_heartbeat_with_which_silence_is_noticed_too_late_is_refused(heartbeat
     assert BEATS * settings(motion={"heartbeat_s": 4}).motion.heartbeat_s < 15.0
 
 
+@pytest.mark.parametrize("codes", [["All"], ["all"], ["VideoMotion", "All"], ["[All]"], ["VideoMotion,AlarmLocal"], []])
+def test_codes_that_would_never_be_told_as_motion_are_refused(codes: list[str]) -> None:
+    with pytest.raises(ValidationError, match=r"codes\n.*expected names of what is motion, such as VideoMotion, got "):
+        settings(motion={"codes": codes})
+    named = ("VideoMotion", "SmartMotionHuman")
+    assert settings(motion={"codes": list(named)}).motion.codes == named
+
+
 @pytest.mark.parametrize("profile", ["lower", ["low"], 1, None])
 def test_another_profile_is_a_fault(profile: object) -> None:
     with pytest.raises(ValidationError, match="profile"):

@@ -2,10 +2,12 @@
 
     attached ──> the camera is asked whether motion is going on
     Start    ──> 1, unless the camera itself turns or has just turned: then everything in its picture moves
+    such a Start without a Stop ──> the camera is asked when it cannot be its turn any more: while it holds a motion
+                 (anti-dither) it tells no new one, and somebody may have come in meanwhile
     Stop     ──> still 1 for `hold_s`, then 0
     no Stop within `hold_s` ──> the camera is asked: it may have been lost, or somebody is still there
     lost     ──> -1 after `GRACE_S`; at once when it had fallen silent, and then until there is a sign of life
-    mute (firmware without heartbeat, or a slow one: silence proves nothing) ──> asked every `MUTE_ASK_S`, too
+    mute (firmware without heartbeat, or a slow one: silence proves nothing) ──> asked every `ASK_S`, too
 
 Not here: the connection (`listener.py`).
 """
@@ -13,11 +15,11 @@ Not here: the connection (`listener.py`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, cast
 
 from services.camera.alarm.listener import Heard
-from services.camera.device import Event, Reply
-from services.camera.errands import GetMotion
+from services.camera.device import Event, Refused, Reply
+from services.camera.errands import GetMotion, GetMotionHold
 from services.camera.plan import Plan, attempt
 from services.camera.upkeep import Facts
 from services.payloads import Motion, stamp
@@ -25,7 +27,9 @@ from services.payloads import Motion, stamp
 GRACE_S = 3.0  # a stream that is back so soon was in no trouble
 UNKNOWN_S = 10.0  # until the first attachment
 MASK_S = 2.0  # after the camera's own motion the picture settles
-MUTE_ASK_S = 5.0
+ASK_S = 5.0  # between two questions where nothing else tells
+LEAST_HOLD_S, MOST_HOLD_S = 5.0, 600.0  # what the anti-dither can be: so long a camera holds a motion that is over
+SLACK_S = 2.0  # by which its timers and the network are late
 NEVER = float("-inf")
 
 Value = Literal[0, 1, -1]
@@ -49,6 +53,8 @@ class MotionWatch:
         self._trouble_at: float | None = None  # when to say so; None: there is none
         self._why = "not attached yet"
         self._active = False  # the camera has told no end of it
+        self._unsure: set[str] = set()  # codes that go on, and may be the camera's own turn
+        self._held_s = LEAST_HOLD_S  # how long the camera holds a motion, as far as it was asked since it turned
         self._moved_at = self._turned_at = NEVER
         self._asked_at = NEVER
         self._asking = False
@@ -93,10 +99,11 @@ class MotionWatch:
     def tick(self, now: float, *, turning: bool, online: bool = True) -> Motion | None:
         """What is to be published; asks the camera where that is wanted. None: nothing is known yet.
 
-        `online`: whether the camera answers, for what is known of it by asking only.
+        `turning`: the camera itself changes its picture. `online`: whether it answers, for what is known of it by
+        asking only.
         """
         if turning:
-            self._turned_at = now
+            self._turned_at, self._held_s = now, LEAST_HOLD_S
         if not self.on:
             self._said = self._said or Motion(value=-1, since=stamp(now))
             return self._said
@@ -114,16 +121,24 @@ class MotionWatch:
         if event.code not in self.codes:
             return
         if event.action == "Stop":
+            self._unsure.discard(event.code)
             if self._active:
                 self._active, self._moved_at = False, at
         elif event.action in ("Start", "Pulse"):
-            self._moves(at, lasting=event.action == "Start")
+            lasting = event.action == "Start"
+            if at - self._turned_at >= MASK_S:
+                self._moves(at, lasting=lasting)
+                return
+            self.masked += 1
+            if lasting:
+                self._unsure.add(event.code)
 
     def _moves(self, at: float, *, lasting: bool) -> None:
-        if at - self._turned_at < MASK_S:
-            self.masked += 1
-        else:
-            self._active, self._moved_at = lasting, at
+        self._active, self._moved_at = lasting, at
+
+    def _its_own(self, at: float, held_s: float) -> bool:
+        """Whether what goes on may be the camera's own last turn, if it holds a motion so long."""
+        return at - self._turned_at <= MASK_S + held_s + SLACK_S
 
     def _lose(self, heard: Heard) -> None:
         was, self._attached = self._attached, False
@@ -137,11 +152,13 @@ class MotionWatch:
 
     def _wants_to_ask(self, now: float) -> bool:
         if self._mute:  # while the camera turns an answer would count for nothing
-            return now - self._asked_at >= MUTE_ASK_S and now - self._turned_at >= MASK_S
+            return now - self._asked_at >= ASK_S and now - self._turned_at >= MASK_S
         if not self._attached:
             return False
         if self._asked_at == NEVER:
             return True
+        if self._unsure and not self._its_own(now, self._held_s):
+            return now - self._asked_at >= ASK_S
         return self._active and now - max(self._moved_at, self._asked_at) >= self.hold_s
 
     def _ask(self) -> Plan[None]:
@@ -149,6 +166,15 @@ class MotionWatch:
             reply = yield from attempt(GetMotion(code))
             if reply.error is not None or reply.result:
                 break
+        if reply.result and not self._active and self._its_own(reply.received, MOST_HOLD_S):
+            self._unsure.add(code)
+            held = yield from attempt(GetMotionHold(code))
+            if held.error is None:
+                self._held_s = cast(float, held.result)
+            elif isinstance(held.error, Refused):
+                self._held_s = MOST_HOLD_S
+            else:
+                reply = held
         self._told(reply)
 
     def _told(self, reply: Reply) -> None:
@@ -160,10 +186,12 @@ class MotionWatch:
             return
         if self._mute:
             self._trouble_at = None
-        if reply.result:
-            self._moves(reply.received, lasting=True)
-        else:
+        if not reply.result:
             self._active = False
+            self._unsure.clear()
+        elif not self._its_own(reply.received, self._held_s):
+            self._unsure.clear()
+            self._moves(reply.received, lasting=True)
 
     def _value(self, now: float) -> Value | None:
         if self._trouble_at is not None and now >= self._trouble_at:

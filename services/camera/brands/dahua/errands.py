@@ -17,6 +17,7 @@ from services.camera.errands import (
     GetClock,
     GetContrast,
     GetMotion,
+    GetMotionHold,
     GetPrivacy,
     GetStorage,
     SetClock,
@@ -30,6 +31,7 @@ Dialogue = Generator[str, str, object]  # yields request targets, is sent the bo
 CLOCK_FORM = "%Y-%m-%d %H:%M:%S"
 CLOCK = "/cgi-bin/global.cgi?action=getCurrentTime"
 STORAGE = "/cgi-bin/storageDevice.cgi?action=getDeviceAllInfo"
+DETECTED = ("VideoMotion", "SmartMotion")  # the codes of the motion detection begin so
 _CONTRAST = re.compile(r"table\.VideoColor\[0\]\[(\d+)\]\.Contrast")
 
 
@@ -38,6 +40,8 @@ def dialogue(errand: Errand) -> Dialogue:
     match errand:
         case GetMotion(code):
             return _motion(code)
+        case GetMotionHold(code):
+            return _motion_hold(code)
         case GetClock():
             return _clock()
         case SetClock(shown):
@@ -75,6 +79,15 @@ def _motion(code: str) -> Dialogue:
     except Refused:
         return False  # `Error: No Events`, which older firmware answers too when there is nothing
     return events.read_indexes(body)
+
+
+def _motion_hold(code: str) -> Dialogue:
+    if not code.startswith(DETECTED):
+        raise Refused(f"it is not known how long the camera holds {code}")
+    held = read_table((yield table("MotionDetect"))).get("table.MotionDetect[0].EventHandler.Dejitter", "")
+    if not held.isdecimal():
+        raise Refused("the camera does not tell how long it holds a motion (MotionDetect)")
+    return float(held)
 
 
 def _clock() -> Dialogue:
