@@ -168,12 +168,13 @@ class GetPicture:
 class SetPicture:
     """Changes how the picture is delivered; None leaves as it is. The answer is the Picture read back.
 
-    `contrast`: that of each profile, 0 to 100, at once with the mode; it is not in the answer.
+    `mode` is for all profiles, `modes` are those of each, and so is `contrast` (0 to 100), which is not in the answer.
     """
 
     flip: bool | None = None
     mirror: bool | None = None
     mode: Mode | None = None
+    modes: tuple[str, ...] = ()
     contrast: tuple[int, ...] = ()
     rank = Rank.CONFIG
 
@@ -238,11 +239,12 @@ class Reading:
 
 @dataclass(frozen=True)
 class Picture:
-    """How the picture is delivered."""
+    """How the picture is delivered; `mode` by day, `modes` in each profile where the camera tells them apart."""
 
     flip: bool
     mirror: bool
     mode: Mode
+    modes: tuple[str, ...] = ()  # day, night, general: our word, or the camera's where we have none; "" untold
 
 
 @dataclass(frozen=True)

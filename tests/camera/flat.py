@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from services.camera.device import (
     GetPicture,
     Identify,
     Identity,
+    Mode,
     Picture,
     Rank,
     Reading,
@@ -107,10 +108,10 @@ class VirtualCamera:
                 return json.dumps([self.motors.reading().pan, self.motors.tilt]).encode(), None
             case GetPicture():
                 return self.picture, None
-            case SetPicture(flip, mirror, mode):
-                old = self.picture
+            case SetPicture(flip, mirror, mode, modes):
+                old, new = self.picture, cast(Mode, modes[0]) if modes else mode
                 self.picture = Picture(
-                    old.flip if flip is None else flip, old.mirror if mirror is None else mirror, mode or old.mode
+                    old.flip if flip is None else flip, old.mirror if mirror is None else mirror, new or old.mode
                 )
                 self.motors.mirror = self.picture.mirror
                 return self.picture, None

@@ -172,7 +172,7 @@ def test_where_firmware_refuses_plain_brackets_they_are_encoded_from_then_on() -
 
     web.answer = answer
     client = camera(web)
-    assert client.send(SetPicture(flip=True)) == Picture(True, False, "auto")
+    assert client.send(SetPicture(flip=True)) == Picture(True, False, "auto", ("auto", "", ""))
     assert ["[" in target for target in web.asked[:2]] == [True, False]
     before = len(web.asked)
     client.send(SetPicture(flip=True))
@@ -282,7 +282,7 @@ def test_the_mode_is_written_where_the_firmware_keeps_it() -> None:
     }
     web.answer = lambda target: httpx.Response(200, text=bodies.get(target.split("&")[-1], "OK\r\n"))
     device = camera(web)
-    assert device.send(GetPicture()) == Picture(True, False, "bw")
+    assert device.send(GetPicture()) == Picture(True, False, "bw", ("bw", "", ""))
     device.send(SetPicture(mode="bw"))
     assert any("VideoInDayNight[0][2].Mode=BlackWhite" in target for target in web.asked)
 
@@ -300,10 +300,35 @@ def test_mode_and_contrast_are_written_at_once(options: str, mode: str) -> None:
         "name=VideoInDayNight": "table.VideoInDayNight[0][0].Mode=BlackWhite\r\n",
     }
     web.answer = lambda target: httpx.Response(200, text=bodies.get(target.split("&")[-1], "OK\r\n"))
-    assert camera(web).send(SetPicture(mode="bw", contrast=(80, 70, 60))) == Picture(True, False, "bw")
+    picture = camera(web).send(SetPicture(mode="bw", contrast=(80, 70, 60)))
+    assert picture == Picture(True, False, "bw", ("bw", "", ""))
     (written,) = (target for target in web.asked if "setConfig" in target)
     assert mode in written
     assert written.endswith("VideoColor[0][0].Contrast=80&VideoColor[0][1].Contrast=70&VideoColor[0][2].Contrast=60")
+
+
+OF_OPTIONS = ("[0].DayNightColor=1", "[0].NightOptions.DayNightColor=2", "[0].NormalOptions.DayNightColor=3")
+OF_DAY_NIGHT = ("[0][0].Mode=Brightness", "[0][1].Mode=BlackWhite", "[0][2].Mode=Gain")
+
+
+@pytest.mark.parametrize(
+    ("name", "lines", "unknown", "colour"),
+    [("VideoInOptions", OF_OPTIONS, "3", "0"), ("VideoInDayNight", OF_DAY_NIGHT, "Gain", "Color")],
+)
+def test_each_profile_has_a_mode_of_its_own_that_is_written_back_as_it_was(
+    name: str, lines: tuple[str, ...], unknown: str, colour: str
+) -> None:
+    web, tables = Web(), {"VideoInOptions": ["[0].Flip=true", "[0].Mirror=false"]}
+    tables[name] = [*tables.get(name, []), *lines]
+    bodies = {f"name={one}": "".join(f"table.{one}{line}\r\n" for line in tables[one]) for one in tables}
+    web.answer = lambda target: httpx.Response(200, text=bodies.get(target.split("&")[-1], "OK\r\n"))
+    device = camera(web)
+    assert device.send(GetPicture()) == Picture(True, False, "auto", ("auto", "bw", unknown))
+    device.send(SetPicture(modes=("auto", "bw", unknown)))
+    device.send(SetPicture(modes=("color", "", "")))
+    written = [target.partition("&")[2] for target in web.asked if "setConfig" in target]
+    first = f"{name}{lines[0].partition('=')[0]}={colour}"
+    assert written == ["&".join(f"{name}{line}" for line in lines), first], "nothing where no mode is told"
 
 
 def test_the_digest_is_the_one_computed_by_hand() -> None:

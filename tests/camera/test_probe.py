@@ -516,7 +516,7 @@ def test_recorded_answers_are_fixtures_that_the_client_understands(
     reading = client.send(Status())
     assert isinstance(reading, Reading)
     assert (reading.pan, reading.tilt, reading.zoom) == pytest.approx(meeting.found.pose, abs=0.2)
-    assert client.send(GetPicture()) == Picture(flip=True, mirror=True, mode="auto")
+    assert client.send(GetPicture()) == Picture(flip=True, mirror=True, mode="auto", modes=("auto", "bw", "auto"))
     assert client.send(Snapshot()) == anonymous.PICTURE
     assert isinstance(client.send(GetClock()), datetime)
     assert client.send(GetContrast()) == (50, 50, 50)

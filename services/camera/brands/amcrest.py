@@ -188,13 +188,14 @@ class Amcrest:
         return picture.read_picture(options, modes)
 
     def _set_picture(self, request: SetPicture) -> Picture:
-        if request.mode is not None and self._in_day_night is None:
+        wanted = any(picture.modes(request))
+        if wanted and self._in_day_night is None:
             self._picture()
-        mode = request.mode if self._in_day_night else None
-        if request.flip is not None or request.mirror is not None or mode is None:
+        newer = wanted and bool(self._in_day_night)
+        if request.flip is not None or request.mirror is not None or not newer:
             self._command(picture.set_picture(request))
-        if mode is not None:
-            self._command(picture.set_mode(mode, request.contrast))
+        if newer:
+            self._command(picture.set_modes(request))
         return self._picture()
 
     def _talk(self, dialogue: errands.Dialogue) -> object:

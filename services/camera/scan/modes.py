@@ -8,24 +8,27 @@ from __future__ import annotations
 
 import json
 import logging
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import cast, get_args
+from typing import Any, cast
 
-from services.camera.device import Away, GetPicture, Mode, Picture, Refused, Reply, SetPicture
+from services.camera.device import Away, GetPicture, Picture, Refused, Reply, SetPicture
 from services.camera.errands import GetContrast, SetContrast
 from services.camera.looks import SCAN_CONTRAST
 from services.camera.plan import Plan, ask, attempt
 from services.whole_file import write_whole
+
+PROFILES = 3  # day, night and general
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Before:
-    """How the camera's picture was; `contrast` empty where it does not tell."""
+    """How the camera's picture was, in each of its profiles; `contrast` empty where it does not tell."""
 
-    mode: Mode
+    modes: tuple[str, ...]
     contrast: tuple[int, ...] = ()
 
 
@@ -46,7 +49,7 @@ class Modes:
         reply = asked if asked is not None and asked.error is None else (yield from ask(GetPicture()))
         picture = cast(Picture, reply.result)
         told = yield from attempt(GetContrast())
-        self.noted = Before(picture.mode, cast(tuple[int, ...], told.result) if told.error is None else ())
+        self.noted = Before(_modes(picture), cast(tuple[int, ...], told.result) if told.error is None else ())
 
     def forget(self) -> None:
         """A new scan asks anew."""
@@ -58,11 +61,13 @@ class Modes:
         if self.noted is None:
             yield from self.note()
         assert self.noted is not None
-        high = Before("bw", (SCAN_CONTRAST,) * len(self.noted.contrast))
-        if self.noted == high:
+        noted = self.noted
+        modes = tuple(mode and "bw" for mode in noted.modes)  # what is not told cannot be restored
+        high = Before(modes, (SCAN_CONTRAST,) * len(noted.contrast))
+        if noted == high:
             raise Refused("the picture is black and white with high contrast already")
         self._write()
-        return (yield from _changed(high))
+        return (yield from _changed(high, lambda now: now == high.modes or now != noted.modes))
 
     def leave(self) -> Plan[None]:
         """As it was. DeviceError: it is still to be restored."""
@@ -81,7 +86,7 @@ class Modes:
             self.file.unlink(missing_ok=True)
 
     def _restore(self, before: Before) -> Plan[None]:
-        yield from _changed(before)
+        yield from _changed(before, lambda now: _same(now, before.modes))
         if self.noted is before:
             self.give_over()
 
@@ -97,26 +102,39 @@ class Modes:
         if self.file is None or not self.file.exists():
             return
         try:
-            kept = json.loads(self.file.read_text(encoding="utf-8"))
-            mode, contrast = kept["mode"], tuple(int(one) for one in kept["contrast"])
+            self.noted, self.changed = _read(json.loads(self.file.read_text(encoding="utf-8"))), True
         except (OSError, ValueError, KeyError, TypeError) as error:
             log.warning("%s cannot be read: %s", self.file, error)
-            return
-        if mode in get_args(Mode):
-            self.noted, self.changed = Before(mode, contrast), True
 
 
-def _changed(to: Before) -> Plan[float]:
-    """Changes mode and contrast in one request, after which the camera exposes anew once; returns about when that was.
+def _read(kept: Any) -> Before:
+    """A note; an older one has one mode, and which profile had it is not known."""
+    modes = tuple(kept["modes"]) if "modes" in kept else (kept["mode"],) * PROFILES
+    if not "".join(modes).isalnum():
+        raise ValueError(f"expected the mode of each profile, got {str(modes)[:80]}")
+    return Before(modes, tuple(int(one) for one in kept["contrast"]))
 
-    Refused where the mode stays as it is; a contrast that does is left.
+
+def _modes(picture: Picture) -> tuple[str, ...]:
+    return picture.modes or (picture.mode,)
+
+
+def _same(now: tuple[str, ...], noted: tuple[str, ...]) -> bool:
+    """Whether all are as noted; an older note has modes of profiles, too, that the camera may not have."""
+    return all(mode in ("", before) for mode, before in zip(now, noted, strict=False) if before)
+
+
+def _changed(to: Before, so: Callable[[tuple[str, ...]], bool]) -> Plan[float]:
+    """Changes modes and contrast in one request, after which the camera exposes anew once; returns about when that was.
+
+    Refused where the modes then are not `so`; a contrast that stays as it is is left.
     """
-    reply = yield from attempt(SetPicture(mode=to.mode, contrast=to.contrast))
+    reply = yield from attempt(SetPicture(modes=to.modes, contrast=to.contrast))
     if isinstance(reply.error, Refused) and to.contrast:
-        reply = yield from attempt(SetPicture(mode=to.mode))
+        reply = yield from attempt(SetPicture(modes=to.modes))
     if reply.error is not None:
         raise reply.error
-    if cast(Picture, reply.result).mode != to.mode:
+    if not so(_modes(cast(Picture, reply.result))):
         raise Refused("the camera said OK, but its video mode has not changed")
     if to.contrast and (yield from attempt(GetContrast())).result != to.contrast:
         again = yield from attempt(SetContrast(to.contrast))

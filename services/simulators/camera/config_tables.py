@@ -11,6 +11,7 @@ from services.simulators.true_camera import Lens
 
 Colour = Literal["colour", "auto", "bw"]
 LEAST_SIDE, MOST_SIDE = 64, 4096  # of a picture, pixels
+PARTS = ("", "NightOptions.", "NormalOptions.")  # of VideoInOptions: by day, by night, in general
 MODES: dict[str, Colour] = {"0": "colour", "1": "auto", "2": "bw"}
 LOOKS = ("VideoColor", "VideoInDayNight", "VideoInMode", "LeLensMask")  # writing these exposes anew
 DAY_NIGHT: dict[str, Colour] = {"Color": "colour", "Brightness": "auto", "BlackWhite": "bw"}
@@ -78,10 +79,20 @@ class Tables:
 
     @property
     def colour(self) -> Colour:
-        """What the day and night switch asks for."""
+        """What the day and night switch asks for, in the profile that is active."""
         if self._profile.daynight == "VideoInDayNight":
-            return DAY_NIGHT.get(self._values["VideoInDayNight[0][0].Mode"], "auto")
-        return MODES.get(self._values["VideoInOptions[0].DayNightColor"], "auto")
+            return DAY_NIGHT.get(self._values[f"VideoInDayNight[0][{self._active}].Mode"], "auto")
+        return MODES.get(self._values[f"VideoInOptions[0].{PARTS[self._active]}DayNightColor"], "auto")
+
+    def tone(self, key: str) -> int:
+        """Contrast, brightness or saturation of the profile that is active, 0 to 100."""
+        return self.number(f"VideoColor[0][{self._active}].{key}")
+
+    @property
+    def _active(self) -> int:
+        """The profile by which pictures are taken: 0 day, 1 night, 2 general."""
+        profile = self.number("VideoInMode[0].Config[0]")
+        return profile if profile < len(PARTS) else 0
 
     def _names(self) -> set[str]:
         return {key.partition("[")[0].partition(".")[0] for key in self._values}

@@ -13,16 +13,18 @@ SUB_WIDTH = 704  # the substream's; its height follows the main stream's shape
 
 
 def _options(profile: Profile) -> dict[str, str]:
+    """By day as the light is, by night black and white."""
     table = {}
-    for part in ("", "NightOptions.", "NormalOptions."):
-        for key, value in (("DayNightColor", "1"), ("Flip", "true"), ("Mirror", "true")):
+    for part, colour in (("", "1"), ("NightOptions.", "2"), ("NormalOptions.", "1")):
+        for key, value in (("DayNightColor", colour), ("Flip", "true"), ("Mirror", "true")):
             table[f"VideoInOptions[0].{part}{key}"] = value
     table["VideoInOptions[0].InfraRed"] = "false"
     table["VideoInOptions[0].NightOptions.SwitchMode"] = "0"
     table["VideoInOptions[0].Rotate90"] = "0"
     if profile.daynight == "VideoInDayNight":
         table = {key: value for key, value in table.items() if not key.endswith("DayNightColor")}
-        table |= {f"VideoInDayNight[0][{p}].Mode": "Brightness" for p in range(3)}
+        modes = ("Brightness", "BlackWhite", "Brightness")
+        table |= {f"VideoInDayNight[0][{p}].Mode": mode for p, mode in enumerate(modes)}
     return table
 
 
@@ -57,7 +59,7 @@ def _motion() -> dict[str, str]:
 
 
 def _mode() -> dict[str, str]:
-    values = {"VideoInMode[0].Config[0]": "2", "VideoInMode[0].Mode": "0"}
+    values = {"VideoInMode[0].Config[0]": "0", "VideoInMode[0].Mode": "0"}
     return values | {"VideoInMode[0].TimeSection[0][0]": "0 00:00:00-24:00:00", "LightGlobal[0].Enable": "true"}
 
 

@@ -16,7 +16,7 @@ from services.camera.scan.footage import Glimpse, Visit
 from services.camera.scan.search import Scan
 from services.camera.video.newest import Frame as VideoFrame
 from services.payloads import FINAL
-from tests.camera.scan.virtual_scan import Seer, VirtualScan, virtual_scan
+from tests.camera.scan.virtual_scan import Seer, VirtualScan, how_it_looks, virtual_scan
 
 PLACES = ["Sofa", "TV", "Kitchen", "Dining"]
 ORDER = json.dumps({"full": True, "places": PLACES, "frames": 4})
@@ -53,7 +53,8 @@ def answers(trial: VirtualScan) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("frames", [0, 5, 12, 20])
 def test_a_scan_is_cancelled_within_a_second_wherever_it_is(trial: VirtualScan, frames: int) -> None:
-    before = trial.inside.device.tables.colour
+    tables = trial.inside.device.tables
+    before = how_it_looks(tables), tables.colour
     scan = trial.begin(ORDER)
     assert trial.flat.until(lambda: len(scan.findings.taken) >= frames and not stands(trial), 60.0)
     ordered = trial.flat.now
@@ -64,7 +65,7 @@ def test_a_scan_is_cancelled_within_a_second_wherever_it_is(trial: VirtualScan, 
     assert stands(trial)
     assert trial.states()[-1].state == "cancelled"
     assert {one["state"] for one in answers(trial)} == {"cancelled", "done"}
-    assert trial.inside.device.tables.colour == before
+    assert (how_it_looks(tables), tables.colour) == before
 
 
 @pytest.mark.parametrize(("place", "mode"), [("Sofa", "auto"), ("Dining", "bw")])
@@ -185,15 +186,31 @@ def answers_now(trial: VirtualScan) -> list[dict[str, Any]]:
     return answers(trial)
 
 
-def test_the_picture_is_restored_by_the_next_life_of_a_service_that_was_killed(tmp_path: Path) -> None:
-    with virtual_scan(tmp_path / "one") as trial:
+@pytest.mark.parametrize("firmware", ["ip3m-941w-2019", "2020s-dahua"])
+def test_the_picture_is_restored_by_the_next_life_of_a_service_that_was_killed(tmp_path: Path, firmware: str) -> None:
+    with virtual_scan(tmp_path / "one", firmware=firmware) as trial:
         trial.sees({})
+        before = how_it_looks(trial.inside.device.tables)
         trial.begin(ORDER)
         assert trial.flat.until(lambda: trial.inside.device.tables.colour == "bw", 60.0)
         note = trial.service.scanner.modes.file
         assert note is not None
         kept = note.read_text(encoding="utf-8")
-    with virtual_scan(tmp_path / "two", note=kept) as trial:
-        tables = trial.inside.device.tables
+    with virtual_scan(tmp_path / "two", note=kept, firmware=firmware) as trial:
+        tables, note = trial.inside.device.tables, trial.service.scanner.modes.file
         assert trial.flat.until(lambda: tables.number("VideoColor[0][0].Contrast") == 50, 10.0)
         assert tables.colour == "auto"
+        assert how_it_looks(tables) == before
+        assert note is not None
+        assert trial.flat.until(lambda: not note.exists(), 10.0)
+
+
+def test_a_note_of_one_mode_for_all_profiles_is_followed(tmp_path: Path) -> None:
+    """As an older version left it: which profile it was of is not known."""
+    with virtual_scan(tmp_path, note='{"mode": "auto", "contrast": [50, 45, 50]}') as trial:
+        note = trial.service.scanner.modes.file
+        assert note is not None
+        assert trial.flat.until(lambda: not note.exists(), 10.0)
+        kept = how_it_looks(trial.inside.device.tables)
+        assert {value for key, value in kept.items() if key.endswith("DayNightColor")} == {"1"}
+        assert [value for key, value in kept.items() if key.endswith("Contrast")] == ["50", "45", "50"]

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
-from services.camera.device import Away, GetPicture, Picture, Refused, Reply, Request, SetPicture
+from services.camera.device import Away, GetPicture, Mode, Picture, Refused, Reply, Request, SetPicture
 from services.camera.errands import GetContrast, SetContrast
 from services.camera.plan import Plan, Stage
 from services.camera.scan.modes import Modes
 from services.errors import DeviceError
 
-BEFORE = (Picture(False, False, "auto"), (50, 45, 50))
-HIGH = (Picture(False, False, "bw"), (80, 80, 80))
+BEFORE = (Picture(False, False, "auto", ("auto", "bw", "Gain")), (50, 45, 50))
+HIGH = (Picture(False, False, "bw", ("bw", "bw", "bw")), (80, 80, 80))
 ANSWER_S = 0.3
 
 
@@ -26,6 +26,7 @@ class Firmware:
     refuses_both: bool = False
     deaf_to_both: bool = False
     deaf_to_contrast: bool = False
+    stuck: tuple[str, ...] = ("", "", "")  # modes that stay, whatever is written
     away_at: type[Request] | None = None  # type: ignore[valid-type]
     picture: Picture = BEFORE[0]
     contrast: tuple[int, ...] = BEFORE[1]
@@ -57,10 +58,11 @@ class Firmware:
         if self.away_at is type(request):
             raise Away("it restarts")
         match request:
-            case SetPicture(mode=mode, contrast=contrast):
+            case SetPicture(modes=modes, contrast=contrast):
                 if contrast and self.refuses_both:
                     raise Refused("Bad Request!")
-                self.picture = Picture(False, False, mode or self.picture.mode)
+                kept = tuple(map(lambda old, new: old or new, self.stuck, modes))
+                self.picture = Picture(False, False, cast(Mode, kept[0]), kept if self.picture.modes else ())
                 if contrast and not self.deaf_to_both and not self.deaf_to_contrast:
                     self.contrast = contrast
                 self.changed_at.append(self.now)
@@ -126,3 +128,86 @@ def test_the_note_is_whole_at_every_moment(tmp_path: Path) -> None:
         Firmware().run(modes.enter())
         assert file.read_text() == before.strip()
         assert reader.read() == before
+
+
+def test_a_camera_with_one_mode_is_restored_to_it() -> None:
+    firmware, modes = Firmware(picture=Picture(False, False, "color")), Modes(None)
+    firmware.run(modes.enter())
+    assert firmware.picture == Picture(False, False, "bw")
+    firmware.run(modes.leave())
+    assert firmware.picture == Picture(False, False, "color")
+
+
+def test_a_profile_that_stays_as_it_is_does_not_hinder_the_others() -> None:
+    firmware, modes = Firmware(stuck=("", "", "Gain")), Modes(None)
+    firmware.run(modes.enter())
+    assert firmware.picture.modes == ("bw", "bw", "Gain")
+    firmware.run(modes.leave())
+    assert (firmware.picture, firmware.contrast) == BEFORE
+
+
+def test_modes_that_all_stay_as_they_are_are_refused_although_one_is_as_wanted() -> None:
+    firmware = Firmware(stuck=BEFORE[0].modes)
+    with pytest.raises(Refused, match="has not changed"):
+        firmware.run(Modes(None).enter())
+
+
+def test_as_before_means_every_profile() -> None:
+    firmware, modes = Firmware(), Modes(None)
+    firmware.run(modes.enter())
+    firmware.stuck = ("", "", "bw")
+    with pytest.raises(Refused, match="has not changed"):
+        firmware.run(modes.leave())
+    assert modes.changed
+
+
+def test_what_the_camera_does_not_tell_is_not_written() -> None:
+    firmware, modes = Firmware(picture=Picture(False, False, "auto", ("auto", "bw", ""))), Modes(None)
+    firmware.run(modes.enter())
+    assert firmware.picture.modes == ("bw", "bw", "")
+    firmware.run(modes.leave())
+    assert firmware.picture.modes == ("auto", "bw", "")
+
+
+def test_black_and_white_by_day_alone_is_not_yet_how_the_second_turn_wants_it() -> None:
+    firmware, modes = Firmware(picture=Picture(False, False, "bw", ("bw", "auto", "bw")), contrast=HIGH[1]), Modes(None)
+    firmware.run(modes.enter())
+    assert firmware.picture == HIGH[0]
+    with pytest.raises(Refused, match="already"):
+        firmware.run(Modes(None).enter())
+
+
+@pytest.mark.parametrize(
+    ("note", "known"),
+    [
+        ('{"modes": ["auto", "bw", "Gain"], "contrast": [50, 45, 50]}', ("auto", "bw", "Gain")),
+        ('{"modes": ["auto", "", ""], "contrast": []}', ("auto", "", "")),
+        ('{"mode": "auto", "contrast": [50, 45, 50]}', ("auto", "auto", "auto")),
+        ('{"modes": ["auto", "bw&Flip=true"], "contrast": []}', None),
+        ('{"modes": ["auto", 2], "contrast": []}', None),
+        ('{"modes": [], "contrast": []}', None),
+        ('{"mode": null, "contrast": []}', None),
+        ('{"mode": "auto", "contrast": ["high"]}', None),
+        ('{"mode": "", "contrast": []}', None),
+        ('["auto"]', None),
+    ],
+)
+def test_a_note_of_every_version_is_read_and_nonsense_is_none(
+    tmp_path: Path, note: str, known: tuple[str, ...] | None
+) -> None:
+    file = tmp_path / "ip1-picture.json"
+    file.write_text(note)
+    modes = Modes(file)
+    assert modes.changed == (known is not None)
+    assert (modes.noted.modes if modes.noted else None) == known
+
+
+@pytest.mark.parametrize("tells", [(), ("bw", "bw", "bw")])
+def test_an_older_note_is_followed_in_every_profile(tmp_path: Path, tells: tuple[str, ...]) -> None:
+    file = tmp_path / "ip1-picture.json"
+    file.write_text('{"mode": "auto", "contrast": [50, 45, 50]}')
+    firmware, modes = Firmware(picture=Picture(False, False, "bw", tells), contrast=HIGH[1]), Modes(file)
+    firmware.run(modes.leave())
+    assert firmware.picture == Picture(False, False, "auto", ("auto",) * len(tells))
+    assert firmware.contrast == BEFORE[1]
+    assert not file.exists()

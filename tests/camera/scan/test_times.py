@@ -13,7 +13,7 @@ from services.camera.scan.search import Scan
 from services.camera.scan.source import Source
 from services.simulators.camera.motors import Pose
 from tests import bounds
-from tests.camera.scan.virtual_scan import VirtualScan, virtual_scan
+from tests.camera.scan.virtual_scan import VirtualScan, how_it_looks, virtual_scan
 
 EVERY = 2 * 9 * 8
 
@@ -125,12 +125,22 @@ def test_what_is_found_is_told_at_once(trial: VirtualScan) -> None:
     assert max(told[marker] - found[marker] for marker in markers) < 0.05
 
 
-def test_the_picture_is_as_it_was_after_a_scan_in_both_modes(trial: VirtualScan) -> None:
-    trial.sees({})
-    tables = trial.inside.device.tables
-    before = tables.read("VideoColor"), tables.colour
-    trial.run('{"full": true}')
-    assert (tables.read("VideoColor"), tables.colour) == before
+@pytest.mark.parametrize("firmware", ["ip3m-941w-2019", "2020s-dahua"])
+@pytest.mark.parametrize("profile", [0, 1])
+@pytest.mark.parametrize("order", ['{"full": true}', '{"targets": [17], "places": ["Sofa", "Kitchen"]}'])
+def test_the_picture_is_as_it_was_after_a_scan_in_both_modes(
+    tmp_path: Path, order: str, profile: int, firmware: str
+) -> None:
+    """Day and night, also where they differ."""
+    with virtual_scan(tmp_path, firmware=firmware) as trial:
+        trial.sees({})
+        tables = trial.inside.device.tables
+        tables.write([("VideoInMode[0].Config[0]", str(profile)), ("VideoColor[0][1].Contrast", "40")])
+        before = how_it_looks(tables), tables.colour
+        assert tables.colour == ("auto", "bw")[profile]
+        _, _, last = trial.run(order)
+        assert (last.state, last.turn) == ("done", 2)
+        assert (how_it_looks(tables), tables.colour) == before
 
 
 def test_only_where_the_first_turn_has_missed_a_target_there_is_a_second(trial: VirtualScan) -> None:

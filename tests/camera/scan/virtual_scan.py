@@ -21,6 +21,7 @@ from services.camera.scan.analysis import Analysed, Task
 from services.camera.scan.search import Scan
 from services.camera.service import CameraService
 from services.payloads import ScanResult, ScanState
+from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.program import Inside
 from services.topics import read
@@ -33,6 +34,9 @@ CONFIG = Path(__file__).parents[3] / "config"
 FRAMES, FPS, SWITCH_S = 8, 10.0, 1.5
 REPORT_WAIT_S, REPORT_POLL_S = 4.0, 0.3
 STREAM_OPENS_S, CONTROL_S = 1.0, 0.3  # as the simulator has them, in the middle; without the picture's own delay
+LOOKS = ("VideoInOptions", "VideoInDayNight", "VideoColor")
+HIGH = {"DayNightColor": "2", "].Mode": "BlackWhite", "Contrast": "80"}  # as a scan's second turn leaves the picture
+SEES_DEG = 25.0
 SMALL = (1152, 648)  # of the camera's large stream: a quarter of the work to draw it
 
 
@@ -116,7 +120,10 @@ class VirtualScan:
         return now, seen
 
 
-SEES_DEG = 25.0
+def how_it_looks(tables: Tables) -> dict[str, str]:
+    """All that the camera keeps of how its picture looks, by key."""
+    lines = [line for name in LOOKS for line in tables.read(name) or ()]
+    return dict(line.removeprefix("table.").split("=", 1) for line in lines)
 
 
 @dataclass
@@ -148,7 +155,12 @@ class Seer:
 
 @contextmanager
 def virtual_scan(
-    folder: Path, *, world: Callable[[dict[str, Any]], None] = lambda world: None, note: str = "", **camera: Any
+    folder: Path,
+    *,
+    world: Callable[[dict[str, Any]], None] = lambda world: None,
+    note: str = "",
+    firmware: str = "ip3m-941w-2019",
+    **camera: Any,
 ) -> Iterator[VirtualScan]:
     """The simulated apartment with K = 8; `world` may change what stands in it, `camera` the camera's section.
 
@@ -157,6 +169,7 @@ def virtual_scan(
     config = Path(shutil.copytree(CONFIG, folder / "config"))
     apartment = yaml.safe_load((config / "simulated.yaml").read_text())
     apartment["cameras"]["ip1"] |= {"frames": FRAMES, **camera}
+    apartment["simulators"]["camera"]["profile"] = firmware
     apartment.pop("persistence"), apartment.pop("bridge")
     (config / "simulated.yaml").write_text(yaml.safe_dump(apartment))
     changed = yaml.safe_load((config / "world.yaml").read_text())
@@ -167,9 +180,9 @@ def virtual_scan(
         (folder / "state" / "cameras" / "ip1-picture.json").write_text(note, encoding="utf-8")
     apart = VirtualApartment(config / "simulated.yaml", {"APARTMENT_STATE": str(folder / "state")})
     if note:
-        modes = [f"VideoInOptions[0].{part}DayNightColor" for part in ("", "NightOptions.", "NormalOptions.")]
-        contrasts = [f"VideoColor[0][{profile}].Contrast" for profile in range(3)]
-        apart.insides["ip1"].device.tables.write([(mode, "2") for mode in modes] + [(one, "80") for one in contrasts])
+        tables = apart.insides["ip1"].device.tables
+        written = {key: high for key in how_it_looks(tables) for end, high in HIGH.items() if key.endswith(end)}
+        tables.write(written.items())
     with apart as flat:
         service = next(one.service for one in flat.runners if isinstance(one.service, CameraService))
         inside = flat.insides["ip1"]

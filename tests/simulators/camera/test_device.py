@@ -144,6 +144,19 @@ def test_black_and_white_is_where_the_firmware_has_it(world: World, profile: str
     assert device.tables.colour == "bw"
 
 
+@pytest.mark.parametrize("profile", ["ip3m-941w-2019", "2020s-dahua"])
+def test_each_profile_has_a_colour_and_contrast_of_its_own_and_the_active_one_counts(
+    world: World, profile: str
+) -> None:
+    device = Device(world.cameras["ip1"], PROFILES[profile], 0.0)
+    assert _ask(device, "configManager.cgi?action=setConfig&VideoColor[0][1].Contrast=70") == "OK\r\n"
+    seen = []
+    for active in ("0", "1", "2", "7"):
+        _ask(device, f"configManager.cgi?action=setConfig&VideoInMode[0].Config[0]={active}")
+        seen.append((device.tables.colour, device.tables.tone("Contrast")))
+    assert seen == [("auto", 50), ("bw", 70), ("auto", 50), ("auto", 50)]
+
+
 def test_a_reboot_returns_to_the_start_and_takes_its_time(device: Device) -> None:
     device.place(Pose(91.6, 40.0, 0.0), 0.0)
     assert _ask(device, "magicBox.cgi?action=reboot", 1.0) == "OK\r\n"

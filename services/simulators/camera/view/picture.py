@@ -201,7 +201,7 @@ class Pictures:
 
     def _toned(self, image: Image, *, grey: bool) -> Image:
         """Black and white, saturation, contrast and brightness as the tables say."""
-        settings = {k: self._tables.number(f"VideoColor[0][0].{k}") for k in ("Brightness", "Contrast", "Saturation")}
+        settings = {key: self._tables.tone(key) for key in ("Brightness", "Contrast", "Saturation")}
         saturation = 0 if grey else settings["Saturation"]
         if saturation != 50:
             plain = cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
