@@ -134,6 +134,9 @@ def probe(
     user: Annotated[
         str, typer.Option(help="Who logs in there; the password is asked, or CAMERA_<NAME>_PASSWORD.")
     ] = "admin",
+    certificate: Annotated[
+        Path | None, typer.Option(help="With --url https://...: the certificate that the camera has to show, as PEM.")
+    ] = None,
     out_folder: Annotated[Path | None, typer.Option("--out", help="Where files go; default probe-<camera>.")] = None,
     yes_move: Annotated[
         bool, typer.Option("--yes-move", help="It may move; without this the terminal is asked.")
@@ -146,7 +149,7 @@ def probe(
     from services.simulators.camera.firmwares import PROFILES
 
     if url is not None:
-        target = command.stranger(camera, url, user, secret_store.lookup())
+        target = command.stranger(camera, url, user, secret_store.lookup(), certificate)
     else:
         known = load(config, (f"camera-{camera}",)).instances
         if f"camera-{camera}" not in known:

@@ -28,6 +28,24 @@ def client_context(section: Keys, ca: Path, cert: Path | None = None, key: Path 
     return made
 
 
+def peer_context(setting: Keys, certificate: Path) -> ssl.SSLContext:
+    """Trusts who shows this very certificate, or one that it has signed, and nobody else; TLS 1.2 or newer.
+
+    ConfigError when the file cannot be used.
+    """
+    *section, name = setting
+    _must_be_readable(tuple(section), **{name: certificate})
+    made = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # with no authority yet, and it requires a certificate
+    # What a device signs for itself names no host that fits. Having the key of this one certificate is the proof.
+    made.check_hostname = False
+    made.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN  # it may be signed by an authority that we do not know
+    try:
+        made.load_verify_locations(cafile=certificate)
+    except ssl.SSLError as error:
+        raise SettingError(setting, f"expected a certificate as PEM, got none in {certificate}") from error
+    return made
+
+
 def server_context(section: Keys, cert: Path, key: Path) -> ssl.SSLContext:
     """Shows that certificate to whoever comes; ConfigError when a file cannot be used."""
     _must_be_readable(section, cert=cert, key=key)

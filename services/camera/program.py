@@ -25,12 +25,14 @@ from services.camera.watchdog import Watchdog, brand, connector
 from services.camera.web.gate import Gate
 from services.errors import ConfigError
 from services.runner import Post
+from services.tls import peer_context
 from services.vision.lens import Lens
 
 
 @contextmanager
 def start(config: Config, post: Post) -> Iterator[CameraService]:
     """The service, with its threads to the camera; at the end a stop is sent and confirmed."""
+    certificate(config)
     view, address, gate = eye(config), config.address, Gate(config.login_retry_s)
     with ExitStack() as stack:  # what was opened last is closed first: nobody gives an order while the motors are ended
         channel = stack.enter_context(closing(Channel(config.name, config.stream, address, config.kind, post, gate)))
@@ -56,15 +58,21 @@ def _listener(config: Config, address: Address, gate: Gate, post: Post) -> Liste
 
 
 def check(config: Config) -> None:
-    """ConfigError with every fault of the files that the configuration names: calibration and places."""
+    """ConfigError with every fault of the files that the configuration names: certificate, calibration, places."""
     faults: list[str] = []
-    for read in (lambda: eye(config), lambda: Places(config.folder / config.places)):
+    for read in (lambda: certificate(config), lambda: eye(config), lambda: Places(config.folder / config.places)):
         try:
             read()
         except ConfigError as error:
             faults += error.faults
     if faults:
         raise ConfigError(faults)
+
+
+def certificate(config: Config) -> None:
+    """ConfigError when the file that the camera's certificate is to be in cannot be used."""
+    if (file := config.address.certificate) is not None:
+        peer_context(("cameras", config.name, "certificate"), file)
 
 
 def eye(config: Config) -> Eye:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 from zoneinfo import available_timezones
 
-from pydantic import Field, SecretStr, field_validator, model_validator
+from pydantic import Field, SecretStr, ValidationInfo, field_validator, model_validator
 
 from services.camera import parameters
 from services.camera.address import Address
@@ -115,6 +115,7 @@ class Config(Section):
     parameters: Path | None = None  # a ROS node's parameters.yaml: what is not given is as there
     brand: str = "amcrest"  # a module of `camera/brands/`
     url: str
+    certificate: Path | None = None  # PEM: the camera's own, or its signer's; None: the system's authorities
     rtsp_port: int = Field(default=554, ge=1, le=65535)
     user: str = ""
     password: SecretStr = SecretStr("")
@@ -168,6 +169,14 @@ class Config(Section):
             raise ValueError(f"expected http://host or https://host without a password in it, got {text[:80]!r}")
         return text
 
+    @field_validator("certificate")
+    @classmethod
+    def is_for_tls(cls, file: Path | None, info: ValidationInfo) -> Path | None:
+        url = info.data.get("url", "")
+        if file is not None and url.startswith("http://"):
+            raise ValueError(f"expected an https:// address in url beside it, got {url[:80]!r}")
+        return file
+
     @field_validator("brand")
     @classmethod
     def is_a_brand(cls, text: str) -> str:
@@ -189,6 +198,7 @@ class Config(Section):
         return Address(
             self.url, self.user, self.password, self.rtsp_port, self.channel,
             self.pan_dead_arc, self.tilt_range, self.zoom_range,
+            None if self.certificate is None else self.folder / self.certificate,
         )  # fmt: skip
 
     @property

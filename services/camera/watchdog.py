@@ -15,8 +15,9 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from types import ModuleType
-from typing import Literal, Protocol, cast
+from typing import Any, Literal, Protocol, cast
 
 from pydantic import SecretStr
 
@@ -41,8 +42,7 @@ class Watchdog:
         self.process = subprocess.Popen(
             [sys.executable, "-c", COMMAND], stdin=subprocess.PIPE, text=True, start_new_session=True
         )
-        content = {**vars(address), "password": address.password.get_secret_value()}
-        self._write(json.dumps({"brand": brand, "address": content}))
+        self._write(json.dumps({"brand": brand, "address": _encode(address)}))
 
     def tell(self, direction: Direction | Literal["drive"] | None) -> None:
         """What turns from now on; None: nothing."""
@@ -121,6 +121,16 @@ def _greet(camera: Camera) -> None:
         log.warning("the watchdog does not reach the camera: %s", error)
 
 
+def _encode(address: Address) -> dict[str, Any]:
+    file = None if address.certificate is None else str(address.certificate)
+    return {**vars(address), "password": address.password.get_secret_value(), "certificate": file}
+
+
+def _read(told: dict[str, Any]) -> Address:
+    file = None if told["certificate"] is None else Path(told["certificate"])
+    return Address(**{**told, "password": SecretStr(told["password"]), "certificate": file})
+
+
 def main() -> None:
     """The process."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -129,5 +139,4 @@ def main() -> None:
     if not first:
         return
     told = json.loads(first)
-    address = Address(**{**told["address"], "password": SecretStr(told["address"]["password"])})
-    watch(sys.stdin, connector(told["brand"], address, Gate()))
+    watch(sys.stdin, connector(told["brand"], _read(told["address"]), Gate()))

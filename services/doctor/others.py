@@ -51,7 +51,7 @@ def readers(config: history.Config) -> Iterator[Finding]:
 def camera(name: str, config: Any) -> Iterator[Finding]:
     """Whether it answers and takes the login: one try, so that a wrong password does not lock the account."""
     part = f"camera {name}"
-    wire = Wire(config.url, config.user, config.password)
+    wire = Wire(config.url, config.user, config.password, config.address.certificate)
     try:
         _log_in(wire, config.brand)
     except Locked as error:

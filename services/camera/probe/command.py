@@ -42,27 +42,32 @@ class Target:
     url: str
     user: str
     password: SecretStr
+    certificate: Path | None = None
 
 
-def stranger(name: str, url: str, user: str, secret: Callable[[str], str | None]) -> Target:
+def stranger(
+    name: str, url: str, user: str, secret: Callable[[str], str | None], certificate: Path | None = None
+) -> Target:
     """A camera that no configuration knows yet; its password is where secrets are, or asked on the terminal."""
     if not NAME.fullmatch(name):
         raise ConfigError([f"CAMERA: expected a name like ip1 (small letters, digits, _), got {name[:80]!r}"])
     if "@" in url or not url.startswith(("http://", "https://")):
         raise ConfigError([f"--url: expected http://host or https://host without a password in it, got {url[:80]!r}"])
+    if certificate is not None and not url.startswith("https://"):
+        raise ConfigError([f"--certificate: expected an https:// address with --url beside it, got {url[:80]!r}"])
     variable = PASSWORD.format(name.upper())
     known = secret(variable)
     if known is not None:
-        return Target(name, url, user, SecretStr(known))
+        return Target(name, url, user, SecretStr(known), certificate)
     if not sys.stdin.isatty():
         raise ConfigError([f"{variable}: expected the camera's password in the environment, got nothing"])
-    return Target(name, url, user, SecretStr(getpass.getpass(f"Password of {user} at {url}: ")))
+    return Target(name, url, user, SecretStr(getpass.getpass(f"Password of {user} at {url}: ")), certificate)
 
 
 def configured(name: str, settings: object) -> Target:
     """A camera of the configuration."""
     assert isinstance(settings, Config)
-    return Target(name, settings.url, settings.user, settings.password)
+    return Target(name, settings.url, settings.user, settings.password, settings.address.certificate)
 
 
 def run(
@@ -73,7 +78,7 @@ def run(
     `known`: the firmwares that have a name, to say which of them it is like.
     """
     quiet = Console(stderr=True, soft_wrap=True, highlight=False) if json_only else out
-    wire = Wire(camera.url, camera.user, camera.password)
+    wire = Wire(camera.url, camera.user, camera.password, camera.certificate)
     with closing(wire), telling(quiet) as (teller, pause):
         found = contact(wire, teller, lambda found: yes_move or _asked(quiet, found, pause))
     found.like = likeness.nearest(found.switches, known)

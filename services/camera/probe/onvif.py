@@ -23,7 +23,7 @@ STEP = "ONVIF"
 def meet(wire: Wire, found: Findings) -> None:
     """Asks who it is, where it looks, what its motors can, and for a picture."""
     found.brand = "onvif"
-    address = Address(wire.url, wire.user, wire.password)
+    address = Address(wire.url, wire.user, wire.password, certificate=wire.certificate)
     camera = connector("onvif", address, Gate(pause=_no_second_try))()
     try:
         _facts(camera, wire, found)

@@ -17,7 +17,7 @@ from services.camera.probe.wire import Wire
 LEVELS, SLOWEST = 8, 0.05  # speeds that there are; degrees/s, where one is so slow that it was hardly measured
 
 
-def section(found: Findings, name: str, user: str) -> str:
+def section(found: Findings, name: str, user: str, certificate: Path | None = None) -> str:
     """The camera's section, as `apartment check` takes it; what could not be found out is a comment."""
     tilt = found.capabilities.get("tilt_range") or [-10, 108]
     channels = found.switches.get("ptz_channels") or ()
@@ -28,6 +28,7 @@ def section(found: Findings, name: str, user: str) -> str:
         f"  {name}:",
         f"    brand: {found.brand or 'amcrest'}",
         f"    url: {found.url}",
+        *([f"    certificate: {json.dumps(str(certificate.resolve()))}"] if certificate else []),
         f"    user: {json.dumps(user)}",
         f"    password: ${{CAMERA_{name.upper()}_PASSWORD}}",
     ]
@@ -122,7 +123,7 @@ def recorded(found: Findings, wire: Wire) -> Mapping[str, str]:
 def write(folder: Path, found: Findings, wire: Wire, name: str) -> list[Path]:
     """Writes all of it; the files, in the order in which a reader wants them."""
     texts = {
-        f"{name}.yaml": section(found, name, wire.user),
+        f"{name}.yaml": section(found, name, wire.user, wire.certificate),
         "profile.yaml": profile(found),
         "report.json": json.dumps(found.data(), indent=2) + "\n",
     }

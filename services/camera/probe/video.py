@@ -29,7 +29,7 @@ def look(wire: Wire, found: Findings) -> None:
     """Opens each stream until a picture of it is there."""
     told = read_table(wire.ask(TABLE, "RTSP").text).get("table.RTSP.Port", "")
     found.rtsp_port = int(told) if told.isdigit() else USUAL_PORT
-    address = Address(wire.url, wire.user, wire.password, found.rtsp_port)
+    address = Address(wire.url, wire.user, wire.password, found.rtsp_port, certificate=wire.certificate)
     gate = Gate(pause=wire.pause)
     for source in SOURCES:
         wire.tell(source)

@@ -11,12 +11,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import httpx
 from pydantic import SecretStr
 
 from services.camera.device import Away, BadLogin, Locked, Refused
 from services.camera.web.digest import Challenge, authorization, read_challenge
+from services.camera.web.trust import away, trust
 
 ANSWER = httpx.Timeout(8.0, connect=3.0)
 PICTURE = httpx.Timeout(25.0, connect=3.0)
@@ -69,6 +71,7 @@ class Wire:
     url: str
     user: str
     password: SecretStr
+    certificate: Path | None = None  # as in `Address`
     clock: Callable[[], float] = time.monotonic
     pause: Callable[[float], None] = time.sleep
     tell: Callable[[str], None] = lambda detail: None  # what a long step is at
@@ -82,7 +85,8 @@ class Wire:
 
     def __post_init__(self) -> None:
         limits = httpx.Limits(max_connections=2, max_keepalive_connections=0)
-        self.http = httpx.Client(base_url=self.url, timeout=ANSWER, limits=limits, trust_env=False)
+        known = trust(self.url, self.certificate)
+        self.http = httpx.Client(base_url=self.url, timeout=ANSWER, limits=limits, verify=known, trust_env=False)
 
     def bare(self, target: str, name: str = "") -> Exchange:
         """Asks without a login."""
@@ -173,7 +177,7 @@ class Wire:
         except httpx.TransportError as error:
             exchange = Exchange(name, target, 0, body=type(error).__name__.encode(), sent=sent)
             if not any(one.status for one in self.exchanges):
-                raise Away(f"nobody answers at {self.url}: {type(error).__name__} {error}".strip()) from error
+                raise away(error, f"nobody answers at {self.url}: {type(error).__name__} {error}".strip()) from error
         else:
             spelled = tuple((key.decode("latin-1"), value.decode("latin-1")) for key, value in response.headers.raw)
             took = self.clock() - sent

@@ -6,6 +6,7 @@ import httpx
 
 from services.camera.address import Address
 from services.camera.device import Away
+from services.camera.web import trust
 from services.camera.web.digest import Login
 
 COMMAND = httpx.Timeout(6.0, connect=2.0)
@@ -20,12 +21,20 @@ def connection(address: Address, login: Login, transport: httpx.BaseTransport | 
     """A client with one connection; `transport` replaces the network in tests."""
     limits = httpx.Limits(max_connections=1, max_keepalive_connections=1)
     return httpx.Client(
-        base_url=address.url, auth=login, timeout=COMMAND, limits=limits, transport=transport, trust_env=False
+        base_url=address.url,
+        auth=login,
+        timeout=COMMAND,
+        limits=limits,
+        transport=transport,
+        verify=trust.trust(address.url, address.certificate),
+        trust_env=False,
     )
 
 
 def fetch(http: httpx.Client, target: str, timeout: httpx.Timeout = COMMAND) -> httpx.Response:
     """The answer, whatever its status; Away when there is none. Brackets in the target are sent as they are."""
+    if timeout in (STOP, PATIENT_STOP) and http.base_url.scheme == "https":
+        timeout = COMMAND  # every connection begins with a handshake, for which small processors need longer
     try:
         return http.get(target, timeout=timeout)
     except httpx.HTTPError as error:
@@ -42,7 +51,7 @@ def lost(error: httpx.HTTPError) -> Away:
     text = f"{type(error).__name__} {error}".strip()
     if isinstance(error, httpx.ConnectError) and "refused" in text:
         text = "it refuses connections, is starting again or has no web server on"
-    away = Away(f"no answer from the camera: {text}")
+    away = trust.away(error, f"no answer from the camera: {text}")
     away.turned_away = any(word in text for word in TURNED_AWAY)
     return away
 

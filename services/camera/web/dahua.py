@@ -81,7 +81,7 @@ class DahuaSound:
         head = {"Content-Type": "Audio/G.711A", "Connection": "close"}
         for _ in range(2):
             signed = head | self._authorization()
-            if upload(self._address.url, signed, SEND, data, g711.RATE, self._gate, ended):
+            if upload(self._address, signed, SEND, data, g711.RATE, self._gate, ended):
                 return
             self._gate.rest()
         raise Away("the camera answers 401 to the sound")

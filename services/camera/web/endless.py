@@ -16,6 +16,7 @@ from services.camera.address import Address
 from services.camera.device import Away
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
+from services.camera.web.trust import away, trust
 
 CONNECT_S = 2.0
 # the second line after heartbeats: the kernel asks after 20 s of silence, every 10 s, and gives up after 5 times
@@ -40,7 +41,9 @@ class Endless:
             base_url=address.url,
             auth=self._login,
             timeout=httpx.Timeout(silence_s, connect=CONNECT_S),
-            transport=httpx.HTTPTransport(socket_options=KEEP_ALIVE, trust_env=False),
+            transport=httpx.HTTPTransport(
+                verify=trust(address.url, address.certificate), socket_options=KEEP_ALIVE, trust_env=False
+            ),
             trust_env=False,
         )
         self._socket: socket.socket | None = None
@@ -61,7 +64,7 @@ class Endless:
             kind = Silent if begun else Away
             raise kind(f"nothing came for {silence_s:g} s") from error
         except httpx.HTTPError as error:
-            raise Away(f"the connection broke: {type(error).__name__} {error}".strip()) from error
+            raise away(error, f"the connection broke: {type(error).__name__} {error}".strip()) from error
         finally:
             self._socket = None
 
@@ -69,7 +72,8 @@ class Endless:
         """From any thread: who reads gets Away."""
         if (open_socket := self._socket) is not None:
             with suppress(OSError):  # it may just have been closed
-                open_socket.shutdown(socket.SHUT_RDWR)
+                # not TLS's own, which lets who reads go on with the bytes as they are on the wire
+                socket.socket.shutdown(open_socket, socket.SHUT_RDWR)
 
 
 class Silent(Away):

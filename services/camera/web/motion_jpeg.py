@@ -15,6 +15,7 @@ from services.camera.video.session import Arrival
 from services.camera.web.connection import connection
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
+from services.camera.web.trust import away
 from services.errors import DeviceError
 
 PATIENCE = httpx.Timeout(4.0, connect=2.0)
@@ -65,7 +66,7 @@ class MotionJpeg:
         try:
             answer = self._http.send(self._http.build_request("GET", target, timeout=PATIENCE), stream=True)
         except httpx.HTTPError as error:
-            raise Away(f"no MJPEG from the camera: {type(error).__name__}") from error
+            raise away(error, f"no MJPEG from the camera: {type(error).__name__}") from error
         if answer.status_code == 401:
             answer.close()
             raise BadLogin("the camera's MJPEG does not know this user and password")

@@ -6,7 +6,6 @@ not what HTTP clients do, so this one is written on the socket. Not here: what i
 
 from __future__ import annotations
 
-import select
 import socket
 import ssl
 import threading
@@ -14,8 +13,10 @@ import time
 from http.client import HTTPConnection, HTTPException, HTTPSConnection
 from urllib.parse import urlsplit
 
+from services.camera.address import Address
 from services.camera.device import Away, Refused
 from services.camera.web.gate import Gate
+from services.camera.web.trust import away, trust
 
 LENGTH = 9_999_999  # what clients announce that these cameras are known to take
 CONNECT_S, SEND_S = 2.0, 6.0
@@ -26,14 +27,14 @@ FAREWELL_S = 1.0  # until a camera that answers at the end has done so
 
 
 def upload(
-    url: str, head: dict[str, str], target: str, data: bytes, rate: float, gate: Gate, ended: threading.Event
+    address: Address, head: dict[str, str], target: str, data: bytes, rate: float, gate: Gate, ended: threading.Event
 ) -> bool:
     """Sends `rate` bytes a second to the end, or until `ended` is set; whether the camera knew the login.
 
     DeviceError when it does not take the sound.
     """
     try:
-        connection = _connection(url)
+        connection = _connection(address)
         try:
             with gate.login() as login:
                 connection.putrequest("POST", target, skip_accept_encoding=True)
@@ -48,14 +49,14 @@ def upload(
         finally:
             connection.close()
     except (OSError, HTTPException) as error:
-        raise Away(f"the sound did not get through: {type(error).__name__} {error}".strip()) from error
+        raise away(error, f"the sound did not get through: {type(error).__name__} {error}".strip()) from error
 
 
-def _connection(url: str) -> HTTPConnection:
-    parts = urlsplit(url)
+def _connection(address: Address) -> HTTPConnection:
+    parts = urlsplit(address.url)
     host = parts.hostname or ""
     if parts.scheme == "https":
-        context = ssl.create_default_context()
+        context = trust(address.url, address.certificate)
         return HTTPSConnection(host, parts.port, timeout=CONNECT_S, context=context)
     return HTTPConnection(host, parts.port, timeout=CONNECT_S)
 
@@ -75,9 +76,8 @@ def _stream(wire: socket.socket, data: bytes, rate: float, ended: threading.Even
 
 def _known(wire: socket.socket, wait_s: float) -> bool:
     """Whether no answer has come that the login is not known; Refused when it is another no."""
-    if not select.select([wire], [], [], wait_s)[0]:
+    if (said := _said(wire, wait_s)) is None:
         return True
-    said = wire.recv(4096)
     if not said:
         raise Away("the camera ended the connection")
     status = said.partition(b" ")[2]
@@ -91,6 +91,15 @@ def _known(wire: socket.socket, wait_s: float) -> bool:
 def _leave(wire: socket.socket) -> bool:
     """Says that this was all; closing at once would throw away what the camera has not read yet."""
     wire.shutdown(socket.SHUT_WR)
-    if not select.select([wire], [], [], FAREWELL_S)[0]:
-        return True
-    return not wire.recv(4096).partition(b" ")[2].startswith(b"401")
+    return not (_said(wire, FAREWELL_S) or b"").partition(b" ")[2].startswith(b"401")
+
+
+def _said(wire: socket.socket, wait_s: float) -> bytes | None:
+    """What has come; None: nothing. TLS has words of its own: that there is something to read need not be an answer."""
+    wire.settimeout(wait_s)
+    try:
+        return wire.recv(4096)
+    except (TimeoutError, BlockingIOError, ssl.SSLWantReadError):
+        return None
+    finally:
+        wire.settimeout(SEND_S)
