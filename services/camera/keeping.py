@@ -32,11 +32,11 @@ class Keeper:
 
     def save(self, order: orders.SavePlace, now: float) -> Plan[None]:
         """Keeps where the camera looks, in a preset of the camera too where there is one for it."""
-        if self.bulletin.turning:
-            raise Refused("the camera is moving")
+        self._must_stand()
         try:
             preset = yield from self._preset(order.place)
-            reading, _ = yield from settle(None)  # after the question: the preset is made of where it looks now
+            reading, _ = yield from settle(ours=False)  # after the question: the preset is made of where it looks now
+            self._must_stand()
             kept = preset is not None and (yield from self._is_kept(order.place, preset))
             number = preset if kept else None
             self.places.save(order.place, Place(pan=reading.pan, tilt=reading.tilt, zoom=reading.zoom, preset=number))
@@ -49,6 +49,11 @@ class Keeper:
         self.places.remove(order.place)
         if preset is not None and preset not in self.places.presets:
             yield from attempt(ClearPreset(preset))
+
+    def _must_stand(self) -> None:
+        """Refused while it turns, or somebody has the motors: whose motion it is, it is not ended for this."""
+        if self.bulletin.turning or self.bulletin.health.moving:
+            raise Refused("the camera is moving")
 
     def _preset(self, name: str) -> Plan[int | None]:
         """The one that it has already, else one that is nobody's; None when that is not known, or none is left."""

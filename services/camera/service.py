@@ -132,8 +132,10 @@ class CameraService:
         self.stage.tick(now)
         self.motors.tick(now)
         self.health.moving = self.motors.busy
-        counts = {"frames": self.scanner.frames, "failed_snapshots": self.feed.spoilt.count}
-        self.counters |= counts | self.answers.counts
+        self.counters |= self.answers.counts | {
+            "frames": self.scanner.frames,
+            "failed_snapshots": self.feed.spoilt.count,
+        }
         self.scanner.tick(now)
         self._watch_motion(now)
         self.bulletin.tick(now, self.counters)

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from services.camera.capabilities import Capabilities
-from services.camera.device import Away, BadLogin, ClearPreset, Refused, SavePreset
+from services.camera.device import Away, BadLogin, ClearPreset, Refused, SavePreset, Start, Stop, TurnFor
 from services.camera.errands import GetPresets
 from services.errors import DeviceError
 from tests.camera.flat import Flat
@@ -57,6 +57,24 @@ def test_a_place_gets_a_preset_that_nobody_has_and_gives_only_that_back(flat: Fl
     assert set(flat.motors.presets) == {1, 2, 3}
     assert carry_out(flat, "Remove", "Kitchen", "b") == "done"
     assert flat.motors.presets == {1: DOOR, 2: BED}
+
+
+@pytest.mark.parametrize("save_first", [False, True])
+def test_who_turns_the_camera_is_not_stopped_for_a_place_and_it_is_not_saved_on_the_way(
+    flat: Flat, save_first: bool
+) -> None:
+    if save_first:
+        flat.order("SaveAs", "Kitchen", order_id="save")
+    flat.order("Move", "Left 4 6", order_id="move")
+    if not save_first:
+        flat.order("SaveAs", "Kitchen", order_id="save")
+    flat.until(lambda: flat.ended("move") and flat.ended("save"))
+    assert flat.states("move")[-1] == "done"
+    assert flat.states("save")[-1] == "refused"
+    assert "moving" in flat.last("save")["error"]
+    assert numbers(flat, SavePreset) == []
+    first = next(at for at, one in enumerate(flat.motors.sent) if isinstance(one, Start | TurnFor))
+    assert sum(isinstance(one, Stop) for one in flat.motors.sent[first:]) == 1
 
 
 def test_a_place_that_is_saved_again_keeps_its_preset_and_nothing_is_asked(flat: Flat) -> None:

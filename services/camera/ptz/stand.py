@@ -22,10 +22,11 @@ LEAST_PAUSE_S, LONGEST_PAUSE_S = 0.05, 0.3  # between two tries of a stop
 LOCKED_PAUSE_S = 60.0  # a camera that takes no login takes no stop either, and each try may lock the account
 
 
-def settle(near: Reading | None = None) -> Plan[tuple[Reading, float]]:
+def settle(near: Reading | None = None, *, ours: bool = True) -> Plan[tuple[Reading, float]]:
     """Reads until two successive readings are equal and the camera does not say that it moves; the reading, the time.
 
-    Firmware exists that never leaves `Moving`: some equal readings overrule it. A motion that goes on is ended again.
+    Firmware exists that never leaves `Moving`: some equal readings overrule it. A motion that goes on is ended again,
+    unless it is not `ours` to end: Refused.
     """
     last, equal, unlike = near, 0, 0
     for _ in range(60):
@@ -37,6 +38,8 @@ def settle(near: Reading | None = None) -> Plan[tuple[Reading, float]]:
         if last is not None and not equal:
             unlike += 1
             if unlike % LOST == 0:
+                if not ours:
+                    raise Refused("the camera is moving")
                 yield from stop(reply.received, every=unlike > LOST)
         last = reading
         if reply.received - reply.sent < GAP_S:
