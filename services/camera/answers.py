@@ -44,17 +44,24 @@ def job(key: str, value: Any, by: Who, order_id: str | None, message: Message) -
 class Answers:
     """Says what becomes of orders: on the bus, and to the one who asked by MQTT 5.
 
-    `ranges`: where the camera can look, in words, for who asks for something else than numbers.
+    `ranges`: where the camera can look, in words, for who asks for something else than numbers. `counts`: where it is
+    counted how orders end.
     """
 
     def __init__(
-        self, camera: str, publish: Callable[[Message], None], where: Callable[[], Position | None], ranges: str = ""
+        self,
+        camera: str,
+        publish: Callable[[Message], None],
+        where: Callable[[], Position | None],
+        ranges: str,
+        counts: dict[str, int],
     ) -> None:
         self.camera = camera
         self.publish = publish
         self.where = where
         self.ranges = ranges
-        self.counts = {f"orders_{state}": 0 for state in FINAL}
+        self.counts = counts
+        counts |= {f"orders_{state}": 0 for state in FINAL}
         self._taken: list[Job] = []  # what has an answer, and not its last one
 
     def tell(self, job: Job, state: OrderState, error: str | None = None, *, clamped: bool = False) -> None:

@@ -82,7 +82,7 @@ class CameraService:
         self.bulletin = Bulletin(config.name, self.health, self.places, publish)
         self.bulletin.diagnostics = config.diagnostics
         self.discovery = Discovery(config.name, publish, on=config.discovery)
-        self.answers = Answers(config.name, publish, self.bulletin.position, config.limits.words)
+        self.answers = Answers(config.name, publish, self.bulletin.position, config.limits.words, self.counters)
         self.early = Early(self.answers)
         self.stage = Stage(sender.submit)
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
@@ -132,10 +132,7 @@ class CameraService:
         self.stage.tick(now)
         self.motors.tick(now)
         self.health.moving = self.motors.busy
-        self.counters |= self.answers.counts | {
-            "frames": self.scanner.frames,
-            "failed_snapshots": self.feed.spoilt.count,
-        }
+        self.counters |= {"frames": self.scanner.frames, "failed_snapshots": self.feed.spoilt.count}
         self.scanner.tick(now)
         self._watch_motion(now)
         self.bulletin.tick(now, self.counters)
