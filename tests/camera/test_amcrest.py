@@ -211,6 +211,16 @@ def test_every_form_of_status_is_read(body: str, reading: Reading) -> None:
     assert camera(web).send(Status()) == reading
 
 
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e999"])
+@pytest.mark.parametrize("was", ["=91.6", "=-2.6", "=1.0", "=29.5", "Zoom=2"])
+def test_a_position_that_is_no_number_is_none(was: str, value: str) -> None:
+    web = Web()
+    body = NEWER if was in NEWER else SHORT
+    web.answer = lambda target: httpx.Response(200, text=body.replace(was, f"{was.partition('=')[0]}={value}\r\n"))
+    with pytest.raises(Away, match="expected a position"):
+        camera(web).send(Status())
+
+
 @pytest.mark.parametrize("works", [1, 0])
 def test_the_channel_is_found_by_asking_for_the_status_with_1_then_0(works: int) -> None:
     web = Web()

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from pydantic import SecretStr
 
 from services.camera.address import Address
+from services.camera.brands.onvif import GENERIC as BOUNDS
 from services.camera.brands.onvif import (
     MEDIA,
     PTZ,
@@ -22,6 +23,7 @@ from services.camera.brands.onvif import (
     position,
     read_capabilities,
     read_presets,
+    read_profile,
     read_reading,
 )
 from services.camera.device import Away, BadLogin, FindStream, Locked, Reading, Refused, Status, StreamAddress
@@ -154,6 +156,14 @@ def test_a_space_in_degrees_is_taken_as_it_is() -> None:
 def test_a_position_that_is_no_number_is_no_position(x: str) -> None:
     with pytest.raises(Away):
         read_reading(status(x, 0.0), Profile("p", (-1.0, 1.0), (-1.0, 1.0), (0.0, 1.0)), ADDRESS)
+
+
+@pytest.mark.parametrize(("low", "high"), [("-INF", "INF"), ("0", "INF"), ("NaN", "1"), ("1", "0"), ("", "1")])
+def test_a_space_without_an_end_is_the_generic_one(low: str, high: str) -> None:
+    ends = "".join(f"<{axis}><Min>{low}</Min><Max>{high}</Max></{axis}>" for axis in ("XRange", "YRange"))
+    spaces = f"<AbsolutePanTiltPositionSpace>{ends}</AbsolutePanTiltPositionSpace>"
+    node = ElementTree.fromstring(f'<PTZNode xmlns="http://www.onvif.org/ver10/schema">{spaces}</PTZNode>')
+    assert read_profile("p", node) == Profile("p", BOUNDS, BOUNDS, (0.0, 1.0))
 
 
 def status(x: object, y: object, z: object = 0.5) -> ElementTree.Element:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from urllib.parse import urlsplit
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import escape
@@ -302,4 +302,4 @@ def _bounds(node: Element, space: str, axis: str, otherwise: Bounds) -> Bounds:
         low, high = (float(end or "") for end in ends)
     except ValueError:
         return otherwise
-    return (low, high) if low < high else otherwise
+    return (low, high) if -inf < low < high < inf else otherwise

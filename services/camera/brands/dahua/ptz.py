@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from math import isfinite, nan
 
 from services.camera.brands.dahua.replies import read_table
 from services.camera.device import Away, Direction, MoveOver, MoveTo, Reading, Refused, Start, TurnFor
@@ -121,10 +122,11 @@ def read_status(body: str) -> Reading:
         for axis in range(3)
     ]
     try:
-        pan, tilt = float(values[0] or ""), float(values[1] or "")
-        zoom = float(values[2] or table.get("status.Zoom", "0"))
-    except ValueError as error:
-        raise Away(f"expected a position in the status, got {body[:80]!r}") from error
+        pan, tilt, zoom = (float(one or "") for one in (*values[:2], values[2] or table.get("status.Zoom", "0")))
+    except ValueError:
+        pan = tilt = zoom = nan
+    if not all(map(isfinite, (pan, tilt, zoom))):
+        raise Away(f"expected a position in the status, got {body[:80]!r}")
     return Reading(pan, tilt, zoom, _moving(table))
 
 
