@@ -19,6 +19,7 @@ from services.camera.settings import ClockSettings
 LOOK_S = 2.0  # between two looks whether something is due: it waits while the camera moves
 STORAGE_EVERY_S = 900.0
 SETTINGS_EVERY_S = 300.0  # somebody may change them on the camera's own page
+JUMP_S = 60.0  # woken later by more than that: this computer has learnt the time, and had told the camera a wrong one
 NEVER_S = 86400.0  # what a camera does not have is asked for again a day later: firmware gets updates
 NONE = "none"  # the camera has no such thing
 HALF_S = 0.5  # the clock shows whole seconds: on average it is half a second later
@@ -72,7 +73,10 @@ class Upkeep:
     def plan(self, now: float) -> Plan[None]:
         """One request at a time, whenever one is due."""
         while True:
-            now = yield from wait(now + LOOK_S)
+            wanted = now + LOOK_S
+            now = yield from wait(wanted)
+            if now - wanted > JUMP_S:
+                self._due[self._look_at_clock] = 0.0
             look = min(self._due, key=lambda one: self._due[one])
             if self.free() and self._due[look] <= now:
                 self._due[look] = now + LOOK_S

@@ -110,6 +110,15 @@ def test_everything_is_looked_at_again_after_the_camera_was_away(tmp_path: Path)
     assert abs(things.fast_s) < 1.0
 
 
+def test_a_computer_that_learns_the_time_late_sets_the_clock_right_again(tmp_path: Path) -> None:
+    late_s = 600.0
+    flat, things = flat_with(tmp_path, late_s)  # the camera knows the time, we do not
+    flat.online().run(20)
+    flat.now, things.fast_s = flat.now + late_s, things.fast_s - late_s
+    flat.run(20)
+    assert abs(things.fast_s) < 1.0
+
+
 def test_an_ordered_reboot_is_followed_by_a_look_at_everything(tmp_path: Path) -> None:
     flat, things = flat_with(tmp_path)
     flat.online().run(20)
