@@ -5,6 +5,7 @@ Written so that a reader sees the old file or the new one; read again when someb
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import math
 import os
@@ -23,6 +24,7 @@ from services.payloads import Places as PlacesPayload
 POSITIONS = "preset_position.yaml"
 PRESETS = "preset_coords.yaml"
 LONGEST_NAME = 80
+NO_FILE = ((errno.ENOENT,), (errno.ENOTDIR,))
 MOST = 500  # places; each is told to everybody, again and again
 CONTROL = ("Cc", "Cs", "Zl", "Zp")  # control characters, halves of characters, and what breaks a line
 NEAR_DEG = 0.6  # a reading that near to a place is at that place
@@ -115,9 +117,7 @@ class Places:
         return None
 
     def _state(self) -> tuple[object, ...]:
-        files = (self.folder / POSITIONS, self.folder / PRESETS)
-        stats = [file.stat() if file.exists() else None for file in files]
-        return tuple((one.st_mtime_ns, one.st_ino, one.st_size) if one else None for one in stats)
+        return tuple(_seen(self.folder / name) for name in (POSITIONS, PRESETS))
 
     @contextmanager
     def _to_be_written(self) -> Iterator[None]:
@@ -148,8 +148,17 @@ class Places:
         self._read_at = self._state()
 
 
+def _seen(file: Path) -> tuple[int, ...]:
+    """What changes with the file; the number of the error where it cannot be seen."""
+    try:
+        one = file.stat()
+    except OSError as error:
+        return (error.errno or 0,)
+    return one.st_mtime_ns, one.st_ino, one.st_size
+
+
 def _values(file: Path) -> document.Document:
-    read = document.read(file, names=True) if file.exists() else document.Document(file, {})
+    read = document.Document(file, {}) if _seen(file) in NO_FILE else document.read(file, names=True)
     if read.value is not None and not isinstance(read.value, dict):
         read.fault((), f"expected places by name, got {str(read.value)[:80]!r}")
     return read

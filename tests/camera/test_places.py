@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 from pathlib import Path
@@ -59,6 +60,45 @@ def test_an_edit_by_hand_is_seen(tmp_path: Path) -> None:
     assert places.reload()
     assert places.named["One"].pan == 5.0
     assert not places.reload()
+
+
+class Vanishing(type(Path())):  # type: ignore[misc]
+    """A file that somebody takes away as soon as it was seen."""
+
+    def exists(self, **how: bool) -> bool:
+        found = super().exists(**how)
+        self.unlink(missing_ok=True)
+        return bool(found)
+
+
+def test_a_file_that_vanishes_while_it_is_looked_at_breaks_nothing(tmp_path: Path) -> None:
+    places = Places(Vanishing(tmp_path))
+    for file in ("preset_position.yaml", "preset_coords.yaml"):
+        (tmp_path / file).write_text("{}\n")
+    places.reload()
+
+
+class Shut(type(Path())):  # type: ignore[misc]
+    """In a folder that was closed to us."""
+
+    shut = False
+
+    def stat(self, **how: bool) -> os.stat_result:
+        if Shut.shut:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return super().stat(**how)  # type: ignore[no-any-return]
+
+
+def test_a_folder_that_is_closed_is_told_once_and_the_old_places_stay(tmp_path: Path) -> None:
+    places = Places(Shut(tmp_path))
+    places.save("One", Place(pan=1.0, tilt=2.0))
+    Shut.shut = True
+    with pytest.raises(ConfigError, match="Permission denied"):
+        places.reload()
+    assert not places.reload()
+    Shut.shut = False
+    assert places.reload()
+    assert list(places.named) == ["One"]
 
 
 @pytest.mark.parametrize("text", ["One: here\n", "- 1\n", "One: [1, x, 0]\n", "One: [1\n"])
