@@ -43,7 +43,7 @@ class Away(DeviceError):
 
 
 class Rank(IntEnum):
-    """What goes first when several requests wait; pictures have a lane of their own."""
+    """What goes first when several requests wait; pictures have a lane of their own, and tell nothing of its health."""
 
     STOP = 0
     MOVE = 1

@@ -1,6 +1,7 @@
 """Requests about the device itself: its clock, alarms, privacy mode, contrast, presets, storage, sound. Values only.
 
-They have the rank of settings. What they are in a brand's words is in `brands/`; a brand may refuse any of them.
+They have the rank of settings, sound that of pictures. What they are in a brand's words is in `brands/`; a brand may
+refuse any of them.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from services.camera.device import Errand
+from services.camera.device import Errand, Rank
 
 
 @dataclass(frozen=True)
@@ -87,11 +88,14 @@ class Record(Errand):
 
     seconds: float
     file: Path
+    rank = Rank.PICTURE  # how it ends, and when, tells nothing about the camera
 
 
 @dataclass(frozen=True)
 class EndRecording(Errand):
     """Ends the recording that runs; what there is of it is kept."""
+
+    rank = Rank.PICTURE
 
 
 @dataclass(frozen=True)
@@ -99,6 +103,7 @@ class Play(Errand):
     """Plays that WAV file on the loudspeaker; answered when it has been played."""
 
     file: Path
+    rank = Rank.PICTURE
 
 
 @dataclass(frozen=True)
