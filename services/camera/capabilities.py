@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
-from services.camera.device import Away, Errand, Identity
+from services.camera.device import Errand, Identity, Refused
 from services.camera.plan import Plan, attempt, wait
 from services.whole_file import write_whole
 
@@ -92,7 +92,7 @@ class Abilities:
                     now = yield from wait(now + BUSY_S)
                 reply = yield from attempt(GetCapabilities(part))
                 now = reply.received
-                if isinstance(reply.error, Away):
+                if reply.error is not None and not isinstance(reply.error, Refused):
                     return  # it is met again when it is back
                 if isinstance(reply.result, Capabilities):
                     told = joined(told, reply.result)

@@ -11,7 +11,7 @@ import pytest
 
 from services.camera.brands.dahua import capabilities as dahua
 from services.camera.capabilities import PARTS, Abilities, Capabilities, GetCapabilities, joined
-from services.camera.device import Away, Identity, Refused, Reply
+from services.camera.device import Away, BadLogin, Identity, Locked, Refused, Reply
 from services.camera.plan import Until
 from services.errors import DeviceError
 from tests.camera.bench import bench, simulator
@@ -96,6 +96,14 @@ def test_a_camera_that_goes_away_is_asked_again_when_it_is_back(tmp_path: Path) 
     abilities = Abilities(tmp_path / "can.json", lambda: True)
     assert len(answered(abilities, IDENTITY, Away("gone"))) == 1
     assert abilities.present is None
+    assert len(answered(abilities, IDENTITY, Capabilities(presets=8))) == len(PARTS)
+
+
+@pytest.mark.parametrize("error", [BadLogin("no"), Locked("no")], ids=["bad_login", "locked"])
+def test_what_was_asked_with_a_wrong_password_is_asked_again(tmp_path: Path, error: DeviceError) -> None:
+    abilities = Abilities(tmp_path / "can.json", lambda: True)
+    assert len(answered(abilities, IDENTITY, error)) == 1
+    assert not (tmp_path / "can.json").exists()
     assert len(answered(abilities, IDENTITY, Capabilities(presets=8))) == len(PARTS)
 
 
