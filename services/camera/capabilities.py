@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
-from services.camera.device import Errand, Identity, Refused
+from services.camera.device import Away, Errand, Identity, Refused
 from services.camera.plan import Plan, attempt, wait
 from services.whole_file import write_whole
 
@@ -86,20 +86,22 @@ class Abilities:
             return
         self._asking = True
         try:
-            told = Capabilities()
+            told, whole = Capabilities(), True
             for part in PARTS:
                 while not self.free():
                     now = yield from wait(now + BUSY_S)
                 reply = yield from attempt(GetCapabilities(part))
                 now = reply.received
-                if reply.error is not None and not isinstance(reply.error, Refused):
+                if isinstance(reply.error, Away) and reply.error.answered:
+                    whole = False
+                elif reply.error is not None and not isinstance(reply.error, Refused):
                     return  # it is met again when it is back
                 if isinstance(reply.result, Capabilities):
                     told = joined(told, reply.result)
         finally:
             self._asking = False
         self.present = told
-        if key:
+        if key and whole:
             self._keep(key, told)
 
     def _keep(self, key: str, told: Capabilities) -> None:

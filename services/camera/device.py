@@ -37,9 +37,13 @@ class Locked(BadLogin):
 
 
 class Away(DeviceError):
-    """No answer in time, or one that makes no sense. `turned_away`: its address answers, and nobody serves there."""
+    """No answer in time (`turned_away`: nobody serves at its address), or a fault or nonsense (`answered`)."""
 
     turned_away = False
+
+    def __init__(self, text: str, *, answered: bool = False) -> None:
+        super().__init__(text)
+        self.answered = answered
 
 
 class Rank(IntEnum):

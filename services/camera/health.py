@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from services.camera.absence import Absence
-from services.camera.device import Away, BadLogin, Locked, Reply, Status
+from services.camera.device import Away, BadLogin, Identify, Locked, Rank, Reply, Request, Status
 from services.payloads import CameraStatus
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0  # between attempts to reach a camera that is away
@@ -58,12 +58,12 @@ class Health:
         return self.next_poll + (REST_S - IDLE_S if self.online and still_s > STIRRED_S else 0.0)
 
     def take(self, reply: Reply) -> None:
-        """Judges one reply. A refusal is an answer too: the camera is there."""
+        """Judges one reply. A refusal is an answer too, and so is a fault in a side question: the camera is there."""
         error = reply.error
         if isinstance(error, BadLogin):
             self._away(reply, "locked" if isinstance(error, Locked) else "bad_login", str(error))
             self.next_poll = reply.received + error.again_s + MARGIN_S
-        elif isinstance(error, Away):
+        elif isinstance(error, Away) and not (error.answered and _aside(reply.request)):
             state: State = "rebooting" if self.rebooting else "degraded" if self.moving else "offline"
             self._away(reply, state, str(error))
             self.absence.take(reply)
@@ -108,3 +108,8 @@ class Health:
                 log.info("%s: online", self.name)
             self.state, self.reason, self.failures = "online", "", 0
             self.next_poll = reply.received + IDLE_S
+
+
+def _aside(request: Request) -> bool:
+    """Whether it is neither about where the camera looks nor its motors nor who it is: it can be used without that."""
+    return request.rank is Rank.CONFIG and not isinstance(request, Identify)

@@ -32,7 +32,7 @@ from services.camera.device import (
     Status,
     Stop,
 )
-from services.camera.errands import GetPresets
+from services.camera.errands import GetPresets, GetStorage
 from services.camera.web.connection import lost
 from services.camera.web.digest import Challenge, authorization, read_challenge
 from services.camera.web.gate import Gate
@@ -266,6 +266,15 @@ def test_an_answer_is_judged_by_status_and_body(status: int, body: str, error: t
     web.answer = lambda target: httpx.Response(status, text=body)
     with pytest.raises(error):
         camera(web).send(Start(Direction.LEFT))
+
+
+@pytest.mark.parametrize(("status", "answered"), [(500, True), (503, True), (401, False)])
+def test_a_fault_of_the_cameras_own_is_an_answer(status: int, answered: bool) -> None:
+    web = Web()
+    web.answer = lambda target: httpx.Response(status, text="anything")
+    with pytest.raises(Away) as error:
+        camera(web).send(GetStorage())
+    assert error.value.answered == answered
 
 
 def test_no_answer_means_away() -> None:

@@ -72,6 +72,7 @@ def answered(abilities: Abilities, identity: Identity | None, answer: Any) -> li
 
 
 def reply(request: Any, answer: Any) -> Reply:
+    answer = answer(request) if callable(answer) else answer
     error = answer if isinstance(answer, DeviceError) else None
     return Reply(request, 1, None if error else answer, error, 0.0, 0.1)
 
@@ -105,6 +106,16 @@ def test_what_was_asked_with_a_wrong_password_is_asked_again(tmp_path: Path, err
     assert len(answered(abilities, IDENTITY, error)) == 1
     assert not (tmp_path / "can.json").exists()
     assert len(answered(abilities, IDENTITY, Capabilities(presets=8))) == len(PARTS)
+
+
+def test_what_a_camera_answers_with_a_fault_is_asked_again_in_another_life_only(tmp_path: Path) -> None:
+    def answer(request: GetCapabilities) -> object:
+        return Away("the camera answered 500", answered=True) if request.part == "privacy" else Capabilities(presets=8)
+
+    abilities = Abilities(tmp_path / "can.json", lambda: True)
+    assert len(answered(abilities, IDENTITY, answer)) == len(PARTS)
+    assert abilities.present == Capabilities(presets=8)
+    assert not (tmp_path / "can.json").exists()
 
 
 def test_a_file_that_makes_no_sense_is_as_good_as_none(tmp_path: Path) -> None:

@@ -75,6 +75,7 @@ def test_a_fault_is_the_error_that_says_what_to_do(codes: tuple[str, ...], kind:
     with pytest.raises(kind) as raised:
         read_envelope(400, fault(*codes))
     assert isinstance(raised.value, kind)
+    assert getattr(raised.value, "answered", True)
 
 
 class Device:

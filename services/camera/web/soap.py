@@ -159,7 +159,7 @@ def fault(told: ElementTree.Element) -> Refused | BadLogin | Locked | Away:
     if {"NotAuthorized", "FailedAuthentication", "FailedCheck"} & set(codes):
         return NotAuthorized("the camera does not accept this user and password")
     if codes == ["Receiver"]:
-        return Away(f"the camera has a fault: {reason}")
+        return Away(f"the camera has a fault: {reason}", answered=True)
     return Refused(f"the camera said no: {reason}")
 
 

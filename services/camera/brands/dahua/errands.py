@@ -113,7 +113,7 @@ def read_clock(body: str) -> datetime:
     try:
         return datetime.strptime(shown, CLOCK_FORM)
     except ValueError as error:
-        raise Away(f"expected a time, got {body[:80]!r}") from error
+        raise Away(f"expected a time, got {body[:80]!r}", answered=True) from error
 
 
 def _privacy() -> Dialogue:

@@ -28,7 +28,7 @@ def check(response: httpx.Response) -> httpx.Response:
             raise Refused("the account has no right to do that")
         raise Away("the camera answered 401 without a reason to doubt the password")  # its connections may be used up
     if response.status_code >= 500 and response.status_code != 501:
-        raise Away(f"the camera answered {response.status_code}")
+        raise Away(f"the camera answered {response.status_code}", answered=True)
     if response.status_code != 200 or text.split()[:1] == ["Error"]:
         raise Refused(f"the camera answered {response.status_code} {' '.join(text.split())[:80]}".strip())
     return response
