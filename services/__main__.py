@@ -155,6 +155,7 @@ def probe(
         if f"camera-{camera}" not in known:
             raise ConfigError([f"{config}:1: cameras: expected {camera!r} there, or its address with --url"])
         target = command.configured(camera, known[f"camera-{camera}"].config)
+    process.exit_when_told()  # what turns is stopped on the way out
     folder, firmwares = out_folder or Path(f"probe-{camera}"), {name: asdict(one) for name, one in PROFILES.items()}
     command.run(out, target, folder, firmwares, yes_move=yes_move, json_only=json)
 

@@ -260,6 +260,13 @@ def _deaths(tell: Callable[[Exception], None]) -> Iterator[None]:
         threading.excepthook = before
 
 
+def exit_when_told() -> None:
+    """SIGTERM, or a terminal that is closed (but for `nohup`), raises SystemExit: the command did not do its work."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda *_: sys.exit(1))
+
+
 def _end_with_parent() -> None:
     """Linux sends us SIGTERM when the supervisor dies, however it dies (prctl(2), PR_SET_PDEATHSIG)."""
     pr_set_pdeathsig = 1

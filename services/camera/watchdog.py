@@ -1,4 +1,4 @@
-"""A small process beside each camera service that stops the camera when the service dies in the middle of a motion.
+"""A small process beside each camera service, and the probe, that stops the camera when those die in a motion.
 
 The service tells it through a pipe what turns. When the pipe closes, by an orderly end or by kill -9, and something
 still turned, it sends the stop. It ignores the signals that end the service: it has to outlive it by a second.

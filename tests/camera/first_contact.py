@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import httpx
 from pydantic import SecretStr
 
+from services.camera.device import Direction
 from services.camera.probe.contact import contact
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
@@ -39,6 +40,9 @@ class Network(virtual.Wire):
     def pause(self, seconds: float) -> None:
         self.now += seconds
 
+    def turning(self, what: Direction | Literal["drive"] | None) -> None:
+        """Is told what turns, as a watchdog is."""
+
 
 def config(**values: Any) -> simulated.Config:
     return simulated.Config.model_validate({"folder": SHIPPED, "user": "ros", "password": PASSWORD, **values})
@@ -46,5 +50,6 @@ def config(**values: Any) -> simulated.Config:
 
 def probed(network: Network, *, may_move: bool = True) -> tuple[Findings, Wire]:
     wire = Wire("http://127.0.0.1", "ros", SecretStr(PASSWORD), clock=lambda: network.now, pause=network.pause)
+    wire.turning = network.turning
     wire.http = httpx.Client(base_url=wire.url, transport=network)
     return contact(wire, Silent(), lambda found: may_move), wire

@@ -7,7 +7,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,11 +17,13 @@ from rich.live import Live
 from rich.prompt import Confirm
 from rich.table import Table
 
+from services.camera.address import Address
 from services.camera.probe import likeness, paper, show
 from services.camera.probe.contact import Teller, contact
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Wire
 from services.camera.settings import Config
+from services.camera.watchdog import Watchdog
 from services.errors import ConfigError
 
 PASSWORD = "CAMERA_{}_PASSWORD"
@@ -79,8 +81,18 @@ def run(
     """
     quiet = Console(stderr=True, soft_wrap=True, highlight=False) if json_only else out
     wire = Wire(camera.url, camera.user, camera.password, camera.certificate)
-    with closing(wire), telling(quiet) as (teller, pause):
-        found = contact(wire, teller, lambda found: yes_move or _asked(quiet, found, pause))
+    with closing(wire), telling(quiet) as (teller, pause), ExitStack() as stack:
+
+        def may_move(found: Findings) -> bool:
+            if allowed := yes_move or _asked(quiet, found, pause):
+                channel = found.switches["ptz_channels"][-1]
+                address = Address(
+                    camera.url, camera.user, camera.password, channel=channel, certificate=camera.certificate
+                )
+                wire.turning = stack.enter_context(closing(Watchdog("amcrest", address))).tell
+            return allowed
+
+        found = contact(wire, teller, may_move)
     found.like = likeness.nearest(found.switches, known)
     files = paper.write(folder, found, wire, camera.name)
     if json_only:

@@ -1,6 +1,7 @@
 """The probe's hand on the motors: runs of a given length, each ended by a stop that is confirmed, and looks on the way.
 
-What is made of them is in `turning`.
+Whoever ends a motion in our place is told of it before it begins, and until it was seen at rest. What is made of the
+runs is in `turning`.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from services.camera.brands.dahua import ptz
 from services.camera.brands.dahua.replies import read_table
 from services.camera.device import Away, Direction, Reading, Refused, Start
+from services.camera.lanes import DRIVE
 from services.camera.probe.findings import Findings
 from services.camera.probe.wire import Exchange, NoRight, Wire
 
@@ -76,6 +78,7 @@ class Turner:
             last = now
             if self.wire.clock() > end:
                 raise Away("the camera does not come to rest")
+        self.wire.turning(None)
         self.samples.append((False, last))
         self.resting = last
         return last
@@ -84,10 +87,12 @@ class Turner:
     def turning(self, direction: Direction, speed: int) -> Iterator[Exchange]:
         """Runs as long as the block does; the stop is sent until it is confirmed. NoRight: nothing was started."""
         denied = False
+        self.wire.turning(direction)
         try:
             started = self.wire.ask(ptz.start(Start(direction, speed, speed), self.channel), "start")
             self.resting = None
             if denied := started.denied:
+                self.wire.turning(None)
                 raise NoRight("the account has no right to turn it")
             if not started.good:
                 raise Refused(f"the camera refuses to turn: {started.status} {started.text[:60]!r}")
@@ -95,6 +100,12 @@ class Turner:
         finally:
             if not denied:
                 self.stop(direction)
+
+    def drive(self, target: str, name: str) -> Exchange:
+        """Asks for what the firmware drives by itself; `rest` waits for its end."""
+        self.wire.turning(DRIVE)
+        self.resting = None
+        return self.wire.ask(target, name)
 
     def stop(self, direction: Direction) -> None:
         """Ends that motion for sure."""

@@ -1,10 +1,12 @@
 """What only a moving camera shows, with leave: speeds, delays, directions, honesty of the status, absolute positions.
 
-It moves by some degrees and back again. Whatever happens, a stop is the last command, and it is confirmed.
+It moves by some degrees and back again. Whatever happens, a stop is the last command, and it is confirmed; who is told
+to end (SystemExit) leaves the way back.
 """
 
 from __future__ import annotations
 
+import sys
 from math import hypot, sqrt
 from statistics import fmean, median
 
@@ -47,9 +49,10 @@ def turn(wire: Wire, found: Findings) -> None:
         _absolute(turner)
         _shares(turner)
     finally:
-        _home(turner, home)
+        if not isinstance(sys.exception(), SystemExit):
+            _home(turner, home)
     for switch, (action, works, otherwise) in ZEROS.items():
-        answer = wire.ask(f"/cgi-bin/ptz.cgi?channel={turner.channel}&action={action}", f"{switch} of zero")
+        answer = turner.drive(f"/cgi-bin/ptz.cgi?channel={turner.channel}&action={action}", f"{switch} of zero")
         found.switches[switch] = works if _done(answer) else otherwise
     _nowhere(turner)
 
@@ -63,7 +66,7 @@ def _nowhere(turner: Turner) -> None:
     most, stored = turner.found.capabilities.get("presets", 1), turner.found.capabilities.get("presets_stored", [])
     number = next((number for number in range(most, 0, -1) if number not in stored), None)
     if number is not None:
-        answer = turner.wire.ask(ptz.preset("GotoPreset", number, turner.channel), "preset that is not stored")
+        answer = turner.drive(ptz.preset("GotoPreset", number, turner.channel), "preset that is not stored")
         turner.found.switches["unset_preset"] = "ok" if _done(answer) else "error"
     turner.rest()
 
@@ -168,13 +171,11 @@ def _shares(turner: Turner) -> None:
     """Shares of half a turn: over none, and to where it stands; one that is taken for something else is watched."""
     here = turner.rest().reading
     moves = "none"
-    if _done(
-        turner.wire.ask(ptz.move_over(MoveOver(0.0, 0.0, 0.0, "moveRelatively"), turner.channel), "moveRelatively")
-    ):
+    over = MoveOver(0.0, 0.0, 0.0, "moveRelatively")
+    if _done(turner.drive(ptz.move_over(over, turner.channel), "moveRelatively")):
         moves = "relative"
     to = MoveTo(here.pan, here.tilt, here.zoom, "moveAbsolutely")
-    turner.resting = None
-    if _done(turner.wire.ask(ptz.move_to(to, turner.channel), "moveAbsolutely to where it stands")):
+    if _done(turner.drive(ptz.move_to(to, turner.channel), "moveAbsolutely to where it stands")):
         if apart(here, _watched(turner, here).reading) > NEAR_DEG:
             turner.found.unknown["moves"] = "moveAbsolutely is taken, but it did not stay where it stands"
             return
@@ -185,8 +186,7 @@ def _shares(turner: Turner) -> None:
 def _go(turner: Turner, goal: Reading) -> Exchange:
     arguments = f"arg1={(180.0 - goal.pan) % 360.0:.1f}&arg2={goal.tilt:.1f}&arg3={goal.zoom:.0f}"
     target = f"/cgi-bin/ptz.cgi?action=start&channel={turner.channel}&code=PositionABS&{arguments}"
-    turner.resting = None
-    return turner.wire.ask(target, "PositionABS")
+    return turner.drive(target, "PositionABS")
 
 
 def _watched(turner: Turner, origin: Reading) -> Sample:

@@ -17,6 +17,7 @@ import httpx
 from pydantic import SecretStr
 
 from services.camera.device import Away, BadLogin, Locked, Refused
+from services.camera.lanes import Turning
 from services.camera.web.digest import Challenge, authorization, read_challenge
 from services.camera.web.trust import away, trust
 
@@ -75,6 +76,7 @@ class Wire:
     clock: Callable[[], float] = time.monotonic
     pause: Callable[[float], None] = time.sleep
     tell: Callable[[str], None] = lambda detail: None  # what a long step is at
+    turning: Turning = lambda what: None  # what turns from now on, before it does (`watchdog.py`); None: nothing
     exchanges: list[Exchange] = field(default_factory=list)
     reuses: bool = False  # a nonce may be used again; found out by `login`
     proven: bool = False  # this user and password have worked
