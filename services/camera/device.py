@@ -39,11 +39,9 @@ class Locked(BadLogin):
 class Away(DeviceError):
     """No answer in time (`turned_away`: nobody serves at its address), or a fault or nonsense (`answered`)."""
 
-    turned_away = False
-
     def __init__(self, text: str, *, answered: bool = False) -> None:
         super().__init__(text)
-        self.answered = answered
+        self.answered, self.turned_away = answered, False
 
 
 class Rank(IntEnum):

@@ -28,6 +28,7 @@ from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
 from services.camera.web.soap import DEVICE, FIRST, SCHEMA, Soap
 
+SERVICE, NAME, WHERE = (f"{{{DEVICE}}}{tag}" for tag in ("Service", "Namespace", "XAddr"))
 MEDIA = "http://www.onvif.org/ver10/media/wsdl"
 PTZ = "http://www.onvif.org/ver20/ptz/wsdl"
 ITSELF_S = 30  # a motion whose stop is lost ends by itself after this: longer than the longest way at a middling speed
@@ -87,7 +88,8 @@ class Onvif:
             case device.SavePreset(number):  # without a token the camera chooses one
                 return self._command("SetPreset", f"<PresetName>apartment-{number}</PresetName>{self._preset(number)}")
             case device.ClearPreset(number):
-                return self._clear(number)
+                known = self._preset(number)
+                return self._command("RemovePreset", known) if known else None
             case GetPresets():
                 return frozenset(self._presets())
             case device.Snapshot():
@@ -111,9 +113,8 @@ class Onvif:
         """Where a service is; not on the host that the camera believes to have, which may be hidden by a router."""
         if service not in self._paths:
             told = self._ask(DEVICE, "GetServices", "<IncludeCapability>false</IncludeCapability>")
-            for one in told.iterfind(f"{{{DEVICE}}}Service"):
-                where = one.findtext(f"{{{DEVICE}}}XAddr") or ""
-                self._paths.setdefault(one.findtext(f"{{{DEVICE}}}Namespace") or "", where)
+            for name, where in ((one.findtext(NAME), one.findtext(WHERE)) for one in told.iterfind(SERVICE)):
+                self._paths.setdefault(name or "", where or "")
         if service not in self._paths:
             raise Refused(f"the camera does not offer {service}")
         return _local(self._paths[service])
@@ -154,10 +155,6 @@ class Onvif:
             raise Refused(f"the camera has no preset {number}")
         return self._command("GotoPreset", known)
 
-    def _clear(self, number: int) -> object:
-        known = self._preset(number)
-        return self._command("RemovePreset", known) if known else None
-
     def _snapshot(self) -> bytes:
         told = self._ask(MEDIA, "GetSnapshotUri", _token("ProfileToken", self._known_profile().token))
         answer = fetch(self.http, _local(told.findtext(f".//{SCHEMA}Uri") or ""), SNAPSHOT)
@@ -180,8 +177,7 @@ class Onvif:
     def _identify(self) -> Identity:
         told = self._ask(DEVICE, "GetDeviceInformation")
         keys = ("Model", "SerialNumber", "FirmwareVersion")
-        model, serial, version = (told.findtext(f"{{{DEVICE}}}{key}") or "" for key in keys)
-        return Identity(model, serial, version)
+        return Identity(*(told.findtext(f"{{{DEVICE}}}{key}") or "" for key in keys))
 
 
 def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:
@@ -246,9 +242,8 @@ def read_reading(told: Element, profile: Profile, address: Address) -> Reading:
     wide, close = address.zoom_range
     words = {node.text for node in told.iterfind(f".//{SCHEMA}MoveStatus/*")}
     moving = True if "MOVING" in words else False if "IDLE" in words else None
-    return Reading(
-        round(pan, 2) % 360.0, round(tilt, 2), round(wide + _share(z, profile.zoom) * (close - wide), 2), moving
-    )
+    zoom = wide + _share(z, profile.zoom) * (close - wide)
+    return Reading(round(pan, 2) % 360.0, round(tilt, 2), round(zoom, 2), moving)
 
 
 def position(goal: Reading, profile: Profile, address: Address) -> tuple[float, float, float]:
