@@ -32,6 +32,7 @@ SERVICE, NAME, WHERE = (f"{{{DEVICE}}}{tag}" for tag in ("Service", "Namespace",
 MEDIA = "http://www.onvif.org/ver10/media/wsdl"
 PTZ = "http://www.onvif.org/ver20/ptz/wsdl"
 ITSELF_S = 30  # a motion whose stop is lost ends by itself after this: longer than the longest way at a middling speed
+WHO = ("Model", "SerialNumber", "FirmwareVersion")
 Bounds = tuple[float, float]
 GENERIC: Bounds = (-1.0, 1.0)
 
@@ -176,8 +177,8 @@ class Onvif:
 
     def _identify(self) -> Identity:
         told = self._ask(DEVICE, "GetDeviceInformation")
-        keys = ("Model", "SerialNumber", "FirmwareVersion")
-        return Identity(*(told.findtext(f"{{{DEVICE}}}{key}") or "" for key in keys))
+        model, serial, version = (told.findtext(f"{{{DEVICE}}}{key}") or "" for key in WHO)
+        return Identity(model, serial, version)
 
 
 def connect(address: Address, gate: Gate, *, urgent: bool = False) -> Camera:
