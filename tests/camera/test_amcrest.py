@@ -221,16 +221,50 @@ def test_a_position_that_is_no_number_is_none(was: str, value: str) -> None:
         camera(web).send(Status())
 
 
+REFUSAL = (400, "Error\r\nBad Request!\r\n")
+NO_POSITION = (200, "\r\n")
+
+
+def answered(status: int, body: str) -> httpx.Response:
+    return httpx.Response(status, text=body)
+
+
 @pytest.mark.parametrize("works", [1, 0])
-def test_the_channel_is_found_by_asking_for_the_status_with_1_then_0(works: int) -> None:
+@pytest.mark.parametrize("bad", [REFUSAL, NO_POSITION])
+def test_the_channel_is_found_by_asking_for_the_status_with_1_then_0(works: int, bad: tuple[int, str]) -> None:
     web = Web()
-    good = httpx.Response(200, text=NEWER)
-    bad = httpx.Response(400, text="Error\r\nBad Request!\r\n")
-    web.answer = lambda target: good if f"channel={works}" in target else bad
+    web.answer = lambda target: answered(*((200, NEWER) if f"channel={works}" in target else bad))
     device = camera(web, channel=None)
     device.send(Status())
     device.send(Status())
     assert [target[-1] for target in web.asked] == (["1", "1"] if works else ["1", "0", "0"])
+
+
+@pytest.mark.parametrize(
+    ("one", "zero", "error"),
+    [
+        (REFUSAL, REFUSAL, Refused),
+        (NO_POSITION, NO_POSITION, Away),  # a camera that starts may answer so
+        (REFUSAL, NO_POSITION, Away),
+        (NO_POSITION, REFUSAL, Away),
+    ],
+)
+def test_a_position_on_neither_channel_is_final_where_both_are_refused(
+    one: tuple[int, str], zero: tuple[int, str], error: type[Exception]
+) -> None:
+    web = Web()
+    web.answer = lambda target: answered(*(one if "channel=1" in target else zero))
+    with pytest.raises(error, match="position"):
+        camera(web, channel=None).send(Status())
+    assert [target[-1] for target in web.asked] == ["1", "0"]
+
+
+def test_a_camera_that_is_lost_while_its_channel_is_looked_for_is_away_at_once() -> None:
+    web = Web()
+    web.answer = lambda target: httpx.Response(500)
+    with pytest.raises(Away, match="500"):
+        camera(web, channel=None).send(Status())
+    assert len(web.asked) == 1
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,7 @@ from services.camera.web.connection import COMMAND, SNAPSHOT, connection, fetch,
 from services.camera.web.dahua import DahuaEar, DahuaSound
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
+from services.errors import DeviceError
 
 
 class Amcrest:
@@ -159,15 +160,20 @@ class Amcrest:
     def _status(self) -> str:
         if self.channel is not None:
             return self._get(ptz.status(self.channel)).text
+        fault: DeviceError = Refused("the camera tells its position on neither channel 1 nor 0")
         for channel in (1, 0):
             try:
                 body = self._get(ptz.status(channel)).text
-                ptz.read_status(body)
             except Refused:
+                continue
+            try:
+                ptz.read_status(body)
+            except Away as no_position:  # not lost: it has answered
+                fault = no_position
                 continue
             self.channel = channel
             return body
-        raise Refused("the camera tells its position on neither channel 1 nor 0")
+        raise fault
 
     def _snapshot(self) -> bytes:
         body = self._get("/cgi-bin/snapshot.cgi", SNAPSHOT).content
