@@ -12,7 +12,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from math import inf, isfinite, nan
-from urllib.parse import urlsplit
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import escape
 
@@ -26,13 +25,11 @@ from services.camera.errands import GetPresets
 from services.camera.web.connection import SNAPSHOT, connection, fetch
 from services.camera.web.digest import Login
 from services.camera.web.gate import Gate
-from services.camera.web.soap import DEVICE, FIRST, SCHEMA, Soap
+from services.camera.web.soap import DEVICE, FIRST, SCHEMA, Soap, local
 
-SERVICE, NAME, WHERE = (f"{{{DEVICE}}}{tag}" for tag in ("Service", "Namespace", "XAddr"))
 MEDIA = "http://www.onvif.org/ver10/media/wsdl"
 PTZ = "http://www.onvif.org/ver20/ptz/wsdl"
 ITSELF_S = 30  # a motion whose stop is lost ends by itself after this: longer than the longest way at a middling speed
-WHO = ("Model", "SerialNumber", "FirmwareVersion")
 Bounds = tuple[float, float]
 GENERIC: Bounds = (-1.0, 1.0)
 
@@ -114,11 +111,12 @@ class Onvif:
         """Where a service is; not on the host that the camera believes to have, which may be hidden by a router."""
         if service not in self._paths:
             told = self._ask(DEVICE, "GetServices", "<IncludeCapability>false</IncludeCapability>")
-            for name, where in ((one.findtext(NAME), one.findtext(WHERE)) for one in told.iterfind(SERVICE)):
-                self._paths.setdefault(name or "", where or "")
+            for one in told.iterfind(f"{{{DEVICE}}}Service"):
+                where = one.findtext(f"{{{DEVICE}}}XAddr") or ""
+                self._paths.setdefault(one.findtext(f"{{{DEVICE}}}Namespace") or "", where)
         if service not in self._paths:
             raise Refused(f"the camera does not offer {service}")
-        return _local(self._paths[service])
+        return local(self._paths[service])
 
     def _known_profile(self) -> Profile:
         """The first profile with motors."""
@@ -158,7 +156,7 @@ class Onvif:
 
     def _snapshot(self) -> bytes:
         told = self._ask(MEDIA, "GetSnapshotUri", _token("ProfileToken", self._known_profile().token))
-        answer = fetch(self.http, _local(told.findtext(f".//{SCHEMA}Uri") or ""), SNAPSHOT)
+        answer = fetch(self.http, local(told.findtext(f".//{SCHEMA}Uri") or ""), SNAPSHOT)
         if answer.status_code == 401:
             raise Away("the camera answered 401 without a reason to doubt the password")
         if not answer.content.startswith(b"\xff\xd8"):
@@ -173,11 +171,12 @@ class Onvif:
         told = self._ask(MEDIA, "GetStreamUri", f"<StreamSetup>{setup}</StreamSetup>{mine}")
         host = httpx.URL(self.address.url).host
         where = f"[{host}]" if ":" in host else host
-        return StreamAddress(f"rtsp://{where}:{self.address.rtsp_port}{_local(told.findtext(f'.//{SCHEMA}Uri') or '')}")
+        return StreamAddress(f"rtsp://{where}:{self.address.rtsp_port}{local(told.findtext(f'.//{SCHEMA}Uri') or '')}")
 
     def _identify(self) -> Identity:
         told = self._ask(DEVICE, "GetDeviceInformation")
-        model, serial, version = (told.findtext(f"{{{DEVICE}}}{key}") or "" for key in WHO)
+        keys = ("Model", "SerialNumber", "FirmwareVersion")
+        model, serial, version = (told.findtext(f"{{{DEVICE}}}{key}") or "" for key in keys)
         return Identity(model, serial, version)
 
 
@@ -268,17 +267,6 @@ def _share(value: float, bounds: Bounds) -> float:
 
 def _token(tag: str, text: str) -> str:
     return f"<{tag}>{escape(text)}</{tag}>"
-
-
-def _local(uri: str) -> str:
-    """Path and query of an address; Away when it is none."""
-    try:
-        parts = urlsplit(uri)
-        local = f"/{parts.path.lstrip('/')}{'?' if parts.query else ''}{parts.query}"
-        httpx.URL(local)
-    except (ValueError, httpx.InvalidURL) as error:
-        raise Away(f"expected an address from the camera, got {uri[:80]!r}") from error
-    return local
 
 
 def _number(node: Element, key: str) -> float:

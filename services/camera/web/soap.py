@@ -12,6 +12,7 @@ import secrets
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
+from urllib.parse import urlsplit
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
@@ -161,6 +162,17 @@ def fault(told: ElementTree.Element) -> Refused | BadLogin | Locked | Away:
     if codes == ["Receiver"]:
         return Away(f"the camera has a fault: {reason}", answered=True)
     return Refused(f"the camera said no: {reason}")
+
+
+def local(uri: str) -> str:
+    """Path and query of an address that the camera tells; Away when it is none."""
+    try:
+        parts = urlsplit(uri)
+        path = f"/{parts.path.lstrip('/')}{'?' if parts.query else ''}{parts.query}"
+        httpx.URL(path)
+    except (ValueError, httpx.InvalidURL) as error:
+        raise Away(f"expected an address from the camera, got {uri[:80]!r}") from error
+    return path
 
 
 def read_clock(told: ElementTree.Element) -> float:
