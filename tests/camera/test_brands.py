@@ -243,6 +243,12 @@ def test_a_snapshot_is_a_jpeg(driver: Camera) -> None:
     assert data.rstrip(b"\0").endswith(b"\xff\xd9")
 
 
+def test_snapshots_follow_each_other_on_a_connection_of_their_own(brand: str, camera: simulated.Simulated) -> None:
+    connect = connector(brand, Address(camera.url, "ros", SecretStr(PASSWORD)), Gate())
+    with closing(connect()), closing(connect()) as pictures:
+        assert all(pictures.send(Snapshot()) for _ in range(3))
+
+
 def test_it_says_who_it_is(driver: Camera) -> None:
     identity = driver.send(Identify())
     assert isinstance(identity, Identity)

@@ -14,7 +14,7 @@ from pydantic import SecretStr
 
 from services.camera.device import Away, BadLogin, Locked
 from services.camera.web.digest import Login
-from services.camera.web.gate import LONGEST_RETRY_S, RETRY_S, Book, Gate
+from services.camera.web.gate import LONGEST_RETRY_S, MOST_FAILURES, RETRY_S, Book, Gate
 from services.errors import DeviceError
 
 WAIT_S = 10.0
@@ -362,3 +362,16 @@ def test_while_a_stop_is_owed_only_what_is_urgent_is_sent() -> None:
         visitors.gate.owe(False)
         assert waiting.result(WAIT_S) == 200
     assert camera.served == 2
+
+
+def test_a_request_that_logs_in_twice_waits_not_for_itself_and_its_repeats_count_as_new() -> None:
+    gate = Gate()
+    for _ in range(MOST_FAILURES + 1):
+        with gate.login() as soap:
+            with gate.login() as http:
+                http.failed()  # an old nonce
+            with gate.login() as http:
+                http.passed()
+            soap.passed()
+    gate.check()
+    assert (gate.book.failures, gate.book.flying, gate.book.others) == (0, 0, 0)

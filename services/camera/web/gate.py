@@ -134,6 +134,11 @@ class Try:
         self.answered = False
         self.doubted = doubted  # one has failed: another with an old nonce would prove nothing, and is one too many
 
+    def again(self) -> None:
+        """It is sent once more, after whatever has failed so far."""
+        with self._gate.changed:
+            self._number, self.doubted = self._gate.book.ever, self._gate.book.failures > 0
+
     def passed(self) -> None:
         """The camera knows us (it may refuse what was asked, for want of rights)."""
         self.answered = True
@@ -160,6 +165,7 @@ class Gate:
         self.clock = clock
         self.pause = pause
         self.changed = threading.Condition()
+        self._mine = threading.local()  # the login of each thread that is on its way
         self.stop_owed = False  # the camera was lost while it turned: a stop is to be the first that reaches it
 
     def owe(self, on: bool) -> None:
@@ -203,18 +209,24 @@ class Gate:
         """Around each request that carries credentials, until its first answer. Waits while that may be one too many.
 
         BadLogin or Locked when nobody may try now, Away when the others take too long. `urgent` is for control.
+        A request that carries them twice (SOAP's own, over HTTP that wants some, too) is one login.
         """
+        if (outer := getattr(self._mine, "login", None)) is not None:
+            outer.again()
+            yield outer
+            return
         self.give_way(urgent=urgent)
         with self.changed:
             if not self.changed.wait_for(lambda: self._open(urgent), PATIENCE_S):
                 raise Away("other logins to this camera have no answer yet")
             number = self.book.tries(urgent=urgent)
             doubted = self.book.failures > 0
-        login = Try(self, number, doubted=doubted)
+        login = self._mine.login = Try(self, number, doubted=doubted)
         try:
             yield login
             login.answered = True  # with anything else: a nonce that was too old, another status
         finally:
+            self._mine.login = None
             with self.changed:
                 self.book.back(urgent=urgent, answered=login.answered)
                 self.changed.notify_all()
