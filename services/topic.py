@@ -40,7 +40,7 @@ LEVELS = {
     "cam": r"[a-z][a-z0-9_]*",
     "robot": r"[a-z][a-z0-9_]*",
     "service": r"[a-z0-9_-]+",
-    "key": r"[^/+#]*",  # what is no order's is refused by who takes orders, with an answer
+    "key": r"[A-Za-z]+",
     "marker": r"[0-9]{1,4}",
     "id": r"[A-Za-z0-9_-]{1,64}",
     "platform": r"[a-z_]+",

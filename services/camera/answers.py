@@ -8,7 +8,7 @@ from typing import Any
 from uuid import uuid4
 
 from services import topics
-from services.bus import Message
+from services.bus import Message, topic_matches
 from services.camera.orders import Command, canonical
 from services.errors import BadMessage
 from services.payloads import FINAL, Order, OrderResult, OrderState, Position, Who
@@ -96,10 +96,13 @@ class Answers:
 
     def refuse(self, message: Message, error: BadMessage) -> None:
         """An order that cannot be taken is answered all the same, with its own id where one can be read."""
-        row, levels = topics.find(message.topic)
-        if row not in (topics.CAMERA_ORDER, topics.CAMERA_POSITION_SET):
+        if topic_matches(topics.CAMERA_ORDER.filter, message.topic):  # whatever the key, which may be no topic's
+            key = canonical(message.topic.rpartition("/")[2])
+        elif topic_matches(topics.CAMERA_POSITION_SET.filter, message.topic):
+            key = "Position"
+        else:
             return
-        key, why = canonical(levels["key"]) if row is topics.CAMERA_ORDER else "Position", str(error)
+        why = str(error)
         if isinstance(error, topics.LateCommand):
             wanted = error.read.payload
             value = wanted.value if isinstance(wanted, Order) else wanted.model_dump(exclude=WHOSE, exclude_none=True)

@@ -169,9 +169,9 @@ def test_keys_and_place_names_are_matched_without_regard_to_case(flat: Flat) -> 
         ("order/Goto", b'{"id": {"id": 1}, "value": 1}', {}, "Goto", None, "id"),
         ("order/Goto", b'{"a":' * 9999, {}, "Goto", None, "Invalid JSON"),
         ("order/Zoom", b'{"value": NaN, "id": "z"}', {}, "Zoom", "z", "zoom 0 to 8"),
-        ("order/Zoom_In", b'{"value": 1, "id": "k"}', {}, "Zoom_In", "k", "no order 'Zoom_In'"),
-        ("order/Goto2", b"Kitchen", {}, "Goto2", None, "there are"),
-        ("order/", b"Kitchen", {}, "", None, "there are"),
+        ("order/Zoom_In", b'{"value": 1, "id": "k"}', {}, "Zoom_In", "k", "no topic like 'camera/ip1/order/Zoom_In'"),
+        ("order/Goto2", b"Kitchen", {}, "Goto2", None, "no topic"),
+        ("order/", b"Kitchen", {}, "", None, "no topic"),
         ("order/Move", b"Sideways", {}, "Move", None, "expected Stop"),
     ],
 )
