@@ -135,7 +135,7 @@ def test_a_picture_that_is_put_back_after_a_scan_is_no_motion(tmp_path: Path) ->
     assert hear(attached=True) == [0]
     flat.run(2.0)
     modes = flat.service.scanner.modes
-    modes.noted, modes.changed = Before("bw"), True
+    modes.noted, modes.changed = Before(("bw",) * 3), True
     flat.service.stage.begin(flat.service.scanner.restored(), flat.now, lambda run, now: None)
     flat._turn()
     flat.until(lambda: flat.camera.picture.mode == "bw")

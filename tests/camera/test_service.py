@@ -612,7 +612,7 @@ def test_what_is_not_an_order_is_told_to_the_runner(tmp_path: Path, message: Mes
 
 def test_two_who_would_restore_the_picture_do_not_wait_for_each_other(flat: Flat) -> None:
     modes = flat.service.scanner.modes
-    modes.noted, modes.changed = Before("color", ()), True
+    modes.noted, modes.changed = Before(("color",) * 3), True
     steps = flat.service.scanner.restored(), flat.service.scanner.restored()
     assert isinstance(next(steps[0]), SetPicture)  # the camera has not answered it yet
     with pytest.raises(StopIteration):
