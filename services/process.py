@@ -95,7 +95,7 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
     if os.environ.get(SUPERVISED):
         _end_with_parent()
     few_arenas()
-    faulthandler.register(signal.SIGUSR1)  # what every thread is doing, for whoever finds a service that hangs
+    signal.signal(signal.SIGUSR1, _tell_where)
     addresses: dict[str, Any] = {}
 
     def one_is_ready(name: str, own: dict[str, Any]) -> None:
@@ -241,6 +241,15 @@ def stop_signals(stop: Callable[[], None]) -> Iterator[None]:
     yield
     if interrupted:
         raise KeyboardInterrupt
+
+
+def _tell_where(_number: int, _frame: object) -> None:
+    """What every thread is doing, for whoever finds a service that hangs.
+
+    Told by Python in this thread, which only waits: what `faulthandler.register` sets up reads the stacks while they
+    change, and ends the process with that now and then (cpython issue 116008).
+    """
+    faulthandler.dump_traceback()
 
 
 @contextmanager

@@ -46,7 +46,7 @@ signal.pause()
 """
 
 
-HAS_A_THREAD = """
+SERVES = """
 import os, signal, sys, threading
 from contextlib import contextmanager
 from pathlib import Path
@@ -59,15 +59,40 @@ from services.section import Section
 
 @contextmanager
 def start(config):
-    threading.Thread(target=lambda: 1 / int(sys.argv[1]) and sys.exit(), name="lane").start()
+    for turn in turns:
+        threading.Thread(target=turn, name="lane", daemon=True).start()
     yield SimpleNamespace(addresses={})
     print("in good order")
 
+BODY
 process.log_to_stderr()
 instance = Instance("odd", Row("odd", "__main__", (), "it has a thread", on_bus=False), Section())
 where = Apartment(Path("-"), BusSettings(), Home(items={}), Path("-"), (), instances={"odd": instance})
-process.serve(where, ["odd"], lambda ready: os.kill(os.getpid(), signal.SIGTERM) if int(sys.argv[1]) else None)
+process.serve(where, ["odd"], ready)
 """
+HAS_A_THREAD = SERVES.replace(
+    "BODY",
+    """
+turns = [lambda: 1 / int(sys.argv[1]) and sys.exit()]
+ready = lambda said: os.kill(os.getpid(), signal.SIGTERM) if int(sys.argv[1]) else None
+""",
+)
+IS_BUSY = SERVES.replace(
+    "BODY",
+    """
+def deep(steps):
+    return deep(steps - 1) if steps else sum(range(50))
+
+def busy():
+    while True:
+        one = threading.Thread(target=deep, args=(20,))
+        one.start()
+        one.join()
+
+turns = [busy] * 4
+ready = lambda said: print("ready", flush=True)
+""",
+)
 
 
 @pytest.mark.parametrize(
@@ -176,3 +201,22 @@ def test_a_thread_that_nobody_expects_to_end_ends_its_process_in_good_order_and_
     assert [one.stdout for one in done] == ["in good order\n", "in good order\n"]
     assert "the thread lane ends by a fault of its own\nTraceback" in done[0].stderr
     assert done[1].stderr == ""
+
+
+def test_who_asks_again_and_again_where_a_service_hangs_does_not_end_it(tmp_path: Path) -> None:
+    story = tmp_path / "story"
+    command = [sys.executable, "-c", IS_BUSY]
+
+    def told_times() -> int:
+        return story.read_text().count("in serve")
+
+    with story.open("w") as told, subprocess.Popen(command, stdout=subprocess.PIPE, stderr=told) as asked:
+        assert asked.stdout is not None
+        asked.stdout.readline()
+        for _ in range(200):
+            before = told_times()
+            asked.send_signal(signal.SIGUSR1)
+            peers.wait_until(lambda before=before: asked.poll() is not None or told_times() > before, "the stacks")
+            assert asked.poll() is None
+        asked.terminate()
+        assert asked.wait(20) == 0
