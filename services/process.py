@@ -30,7 +30,7 @@ from services.bus.connection import Address
 from services.bus.mqtt import MqttBus
 from services.config import Apartment, BusSettings, Instance
 from services.errors import ConfigError, Unavailable, words
-from services.memory import few_arenas
+from services.memory import few_arenas, freeze
 from services.runner import Runner
 from services.steering import Steered
 from services.topics import SERVICE_STATUS
@@ -101,6 +101,7 @@ def serve(apartment: Apartment, names: Sequence[str], ready: Ready) -> None:
     def one_is_ready(name: str, own: dict[str, Any]) -> None:
         addresses[name] = own
         if len(addresses) == len(names):
+            freeze()
             ready(addresses[name] if len(names) == 1 else {"services": addresses})
 
     stopping, asked, died = threading.Event(), deque[bool](), deque[Exception]()

@@ -77,6 +77,17 @@ turns = [lambda: 1 / int(sys.argv[1]) and sys.exit()]
 ready = lambda said: os.kill(os.getpid(), signal.SIGTERM) if int(sys.argv[1]) else None
 """,
 )
+TELLS_WHAT_IT_WALKS = SERVES.replace(
+    "BODY",
+    """
+import gc
+turns = []
+
+def ready(said):
+    print(gc.get_freeze_count(), len(gc.get_objects()))
+    os.kill(os.getpid(), signal.SIGTERM)
+""",
+)
 IS_BUSY = SERVES.replace(
     "BODY",
     """
@@ -220,3 +231,9 @@ def test_who_asks_again_and_again_where_a_service_hangs_does_not_end_it(tmp_path
             assert asked.poll() is None
         asked.terminate()
         assert asked.wait(20) == 0
+
+
+def test_what_a_service_was_started_with_is_not_walked_by_the_collector() -> None:
+    done = subprocess.run([sys.executable, "-c", TELLS_WHAT_IT_WALKS], capture_output=True, text=True, timeout=20)
+    frozen, walked = map(int, done.stdout.split()[:2])
+    assert frozen > 20 * walked

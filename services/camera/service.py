@@ -80,7 +80,7 @@ class CameraService:
         self.places = Places(config.folder / config.places)
         self.health = Health(config.name)
         self.bulletin = Bulletin(config.name, self.health, self.places, publish)
-        self.bulletin.diagnostics = config.diagnostics
+        self.bulletin.diagnostics, self.bulletin.video = config.diagnostics, channel
         self.discovery = Discovery(config.name, publish, on=config.discovery)
         self.answers = Answers(config.name, publish, self.bulletin.position, config.limits.words, self.counters)
         self.early = Early(self.answers)
@@ -92,7 +92,6 @@ class CameraService:
         self.scanner = Scanner(config, self.trips.skill, eye, analyst, self.bulletin, self.places)
         self.scanner.begin = self._begin
         self.calibrator = Calibrator(config, self.trips, self.scanner, publish)
-        self.bulletin.video = channel
         self.feed = Feed(config, self.health, self.bulletin.facts, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
         self.chores = Chores(self.trips, self.scanner, self.health, self.bulletin, self.feed, takes, self.calibrator)
@@ -166,8 +165,9 @@ class CameraService:
         return self._flush()
 
     def close(self) -> None:
-        """Ends the processes of a scan that is under way."""
+        """Ends the processes of a scan that is under way; what was learnt is on the disk then."""
         self.scanner.close()
+        self.trips.kept.written()
 
     def _flush(self) -> list[Message]:
         out = list(self._out)

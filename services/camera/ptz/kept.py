@@ -1,12 +1,14 @@
 """What was learnt of a camera's motors, kept over a restart: a small file for each camera, by serial and firmware.
 
-Another camera under the same name, or another firmware, begins anew. A file that cannot be read is as none.
+Another camera under the same name, or another firmware, begins anew. A file that cannot be read is as none. A thread
+writes it: a disk takes its time, and whoever waits for the end of a move, or gives the next order, does not.
 """
 
 from __future__ import annotations
 
 import logging
 from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +71,7 @@ class Kept:
     def __init__(self, folder: Path | None, camera: str) -> None:
         self.camera, self.file = camera, folder / "cameras" / f"{camera}.json" if folder else None
         self.identity: Identity | None = None
+        self._writer = ThreadPoolExecutor(1, "kept motors")
 
     def recall(self, identity: Identity, skill: Skill) -> None:
         """It is known which camera this is: takes in what was kept of that one."""
@@ -83,14 +86,13 @@ class Kept:
             log.info("the motors of %s are not known yet: %s", identity.serial, SHOW_THEM.format(self.camera))
 
     def save(self, skill: Skill) -> None:
-        """Writes it, at once as a whole."""
-        if self.file is None or self.identity is None:
-            return
-        text = _kept(self.identity, skill).model_dump_json()
-        try:
-            write_whole(self.file, text)
-        except OSError as error:
-            log.warning("what was learnt of the motors is not kept: %s", error)
+        """Has it written, as a whole; `written` waits for that."""
+        if self.file is not None and self.identity is not None:
+            self._writer.submit(_write, self.file, _kept(self.identity, skill).model_dump_json())
+
+    def written(self) -> None:
+        """Returns when all that was to be kept is on the disk, or could not be."""
+        self._writer.submit(lambda: None).result()
 
     def _read(self) -> _Kept | None:
         return _read(self.file) if self.file is not None else None
@@ -104,6 +106,13 @@ def recalled(folder: Path, camera: str) -> Skill | None:
     skill = Skill(picture=kept.picture)
     _take_in(kept, skill)
     return skill
+
+
+def _write(file: Path, text: str) -> None:
+    try:
+        write_whole(file, text)
+    except OSError as error:
+        log.warning("what was learnt of the motors is not kept: %s", error)
 
 
 def _read(file: Path) -> _Kept | None:

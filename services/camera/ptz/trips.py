@@ -61,12 +61,13 @@ class Trips:
             self.kept.save(self.skill)
 
     def calibrate(self) -> Plan[Arrival]:
-        """Learns the motors on purpose."""
+        """Learns the motors on purpose; it is on the disk when that is done."""
         self._believe()
         try:
             return (yield from calibrate(self.config.limits, self.skill))
         finally:
             self.kept.save(self.skill)
+            self.kept.written()
 
     def _believe(self) -> None:
         told = self.abilities.present

@@ -23,6 +23,7 @@ ODD = 0.01  # of the looks tell nothing
 EXACT = 0.003  # of the rate stays in doubt,
 LONGER = 1 + 2 * EXACT  # so that it may be slower than all that is reckoned with
 UNLIKELY = 0.001  # beside the likeliest: not worth to be kept
+MOST_FITS = 1000  # are kept: where more fit, looks have told little more than a rate and its doubt do
 OTHERWISE = 1e-5  # of what was kept is doubted, so that something else can be learnt
 
 Grid = NDArray[np.float64]
@@ -46,9 +47,11 @@ class ZoomRate:
 
     @property
     def fits(self) -> list[Fit]:
-        """What fits all looks, but for what hardly does."""
+        """What fits all looks, but for what hardly does; nothing where that is too much to tell anything."""
         share = self._likely / self._likely.max()
         slows, rates = np.nonzero(share > UNLIKELY)
+        if len(rates) > MOST_FITS:
+            return []
         fits = np.stack([RATES[rates], SLOWS_S[slows, 0], share[slows, rates]], axis=1).round(4)
         return [(rate, seconds, likely) for rate, seconds, likely in fits.tolist()]
 

@@ -155,6 +155,7 @@ def test_what_was_learnt_is_known_again_after_a_restart(tmp_path: Path) -> None:
     kept = Kept(folder, "ip1")
     kept.recall(identity, skill)
     kept.save(skill)
+    kept.written()
     again = Skill()
     Kept(folder, "ip1").recall(identity, again)
     assert again.paces[0].rate(8) == pytest.approx(skill.paces[0].rate(8), abs=1e-6)
@@ -172,6 +173,7 @@ def test_a_camera_whose_motors_are_not_known_says_what_would_show_them(
     kept.recall(identity, Skill())
     assert hint in caplog.text
     kept.save(Skill())
+    kept.written()
     caplog.clear()
     Kept(tmp_path, "ip1").recall(identity, Skill())
     assert hint not in caplog.text
@@ -183,10 +185,26 @@ def test_another_camera_or_another_firmware_is_learnt_anew(tmp_path: Path) -> No
     kept = Kept(folder, "ip1")
     kept.recall(Identity("M", "S1", "V1"), skill)
     kept.save(skill)
+    kept.written()
     for identity in (Identity("M", "S2", "V1"), Identity("M", "S1", "V2")):
         fresh = Skill()
         Kept(folder, "ip1").recall(identity, fresh)
         assert fresh.diagonals
+
+
+@pytest.mark.parametrize("looks", [0, 1])
+def test_what_looks_have_not_told_of_zoom_does_not_fill_the_disk_with_every_move(tmp_path: Path, looks: int) -> None:
+    skill, kept = Skill(), Kept(tmp_path, "ip1")
+    for _ in range(looks):
+        skill.zoom_rate.see(1.0, 1.0, 3.0)
+    kept.recall(Identity("M", "S1", "V1"), skill)
+    kept.save(skill)
+    kept.written()
+    assert kept.file is not None
+    assert kept.file.stat().st_size < 30_000
+    again = Skill()
+    Kept(tmp_path, "ip1").recall(Identity("M", "S1", "V1"), again)
+    assert again.zoom_rate.known() == pytest.approx(skill.zoom_rate.known(), rel=0.25)
 
 
 def test_a_file_that_cannot_be_read_is_as_none(tmp_path: Path) -> None:

@@ -78,6 +78,7 @@ def test_what_was_learnt_of_it_is_kept(tmp_path: Path) -> None:
     kept = Kept(tmp_path, "ip1")
     kept.recall(identity, skill)
     kept.save(skill)
+    kept.written()
     Kept(tmp_path, "ip1").recall(identity, again)
     known = again.scales["Position"].laws[0]
     assert known.at(4.0) == pytest.approx(point.at(4.0))
