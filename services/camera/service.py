@@ -88,9 +88,8 @@ class CameraService:
         self.motors = Motors(self.stage, self.answers, self._motor_plan, self._motor_ended)
         self.abilities = Abilities(config.state and config.state / f"{config.name}-can.json", self._has_time)
         self.trips = Trips(config, self.bulletin, self.places, self.abilities)
-        self.motors.skill = self.trips.skill
         self.scanner = Scanner(config, self.trips.skill, eye, analyst, self.bulletin, self.places)
-        self.scanner.begin = self._begin
+        self.motors.skill, self.scanner.begin = self.trips.skill, self._begin
         self.calibrator = Calibrator(config, self.trips, self.scanner, publish)
         self.feed = Feed(config, self.health, self.bulletin.facts, channel, publish)
         takes = Takes(config.name, config.folder / config.audio, publish)
@@ -290,6 +289,7 @@ class CameraService:
         return self.trips.plan(command, now)
 
     def _motor_ended(self, job: Job, state: OrderState, error: str | None, rest: Reading | None, now: float) -> None:
+        self.trips.keep(job.command)
         if state == "done":
             self.bulletin.rests(rest)
         if isinstance(job.command, ScanFor):

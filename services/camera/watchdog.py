@@ -29,6 +29,7 @@ from services.errors import DeviceError
 
 STILL = "-"
 END_S = 0.5  # the service waits so long for the end of its watchdog, which may still have something to stop
+AGAIN_S = 0.5  # from its end to the beginning of another one
 STOP_S = 60.0  # the watchdog tries to stop a camera for so long
 COMMAND = "from services.camera.watchdog import main; main()"
 
@@ -36,33 +37,61 @@ log = logging.getLogger(__name__)
 
 
 class Watchdog:
-    """The service's end of the pipe."""
+    """The service's end of the pipe. A watchdog that dies is followed by another one, which is told what turns."""
 
     def __init__(self, brand: str, address: Address) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", COMMAND], stdin=subprocess.PIPE, text=True, start_new_session=True
-        )
-        self._write(json.dumps({"brand": brand, "address": _encode(address)}))
+        self._address = json.dumps({"brand": brand, "address": _encode(address)})
+        self._turns: str | None = None  # the last word; None: none was said yet
+        self._changing = threading.RLock()
+        self._closing = threading.Event()
+        self.process = self._begin()
 
     def tell(self, direction: Direction | Literal["drive"] | None) -> None:
         """What turns from now on; None: nothing."""
-        self._write(direction.name if isinstance(direction, Direction) else direction or STILL)
+        with self._changing:
+            self._turns = direction.name if isinstance(direction, Direction) else direction or STILL
+            self._write(self.process, self._turns)
 
     def close(self) -> None:
         """Lets it see the end of the pipe."""
-        assert self.process.stdin is not None
+        with self._changing:
+            self._closing.set()
+            assert self.process.stdin is not None
+            try:
+                self.process.stdin.close()
+            except OSError as error:
+                log.warning("the watchdog has not heard of the end: %s", error)
         try:
-            self.process.stdin.close()
             self.process.wait(END_S)
-        except (OSError, subprocess.TimeoutExpired) as error:
+        except subprocess.TimeoutExpired as error:
             log.warning("the watchdog is still at work: %s", error)
-            threading.Thread(target=self.process.wait, name="watchdog's end", daemon=True).start()  # no zombie stays
 
-    def _write(self, line: str) -> None:
-        assert self.process.stdin is not None
+    def _begin(self) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, "-c", COMMAND], stdin=subprocess.PIPE, text=True, start_new_session=True
+        )
+        threading.Thread(target=self._follow, args=(process,), name="watchdog's end", daemon=True).start()
+        self._write(process, self._address)
+        if self._turns is not None:
+            self._write(process, self._turns)
+        return process
+
+    def _follow(self, process: subprocess.Popen[str]) -> None:
+        """A thread's body: until that process ends, which leaves no zombie."""
+        status = process.wait()
+        if self._closing.is_set():
+            return
+        log.error("the watchdog has ended with %d; another one begins in %.0f s", status, AGAIN_S)
+        self._closing.wait(AGAIN_S)
+        with self._changing:
+            if not self._closing.is_set():
+                self.process = self._begin()
+
+    def _write(self, process: subprocess.Popen[str], line: str) -> None:
+        assert process.stdin is not None
         try:
-            self.process.stdin.write(f"{line}\n")
-            self.process.stdin.flush()
+            process.stdin.write(f"{line}\n")
+            process.stdin.flush()
         except OSError as error:
             log.error("the watchdog is gone, a crash would leave the camera turning: %s", error)
 

@@ -27,6 +27,10 @@ def test_the_motor_stands_still_soon_after_the_service_was_killed(flat: SmallFla
     assert trials.kill_service(flat) < trials.STOPPED_S
 
 
+def test_so_it_does_where_the_watchdog_was_killed_before(flat: SmallFlat) -> None:
+    assert trials.kill_watchdog(flat) < trials.STOPPED_S
+
+
 def test_a_service_that_is_told_to_end_stops_the_motor_and_tells_that_the_order_has_ended(flat: SmallFlat) -> None:
     assert trials.end_service(flat) < trials.STOPPED_S
 

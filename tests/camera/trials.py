@@ -22,7 +22,7 @@ from services.bus import Message
 from services.client import Client
 from services.payloads import CameraStatus, Order
 from services.topics import CAMERA_ORDER, read
-from tests.small_flat import Door, SmallFlat, end_orphans
+from tests.small_flat import Door, SmallFlat, end_orphans, family
 
 NOTICED_S = 15.0  # a fault shows in the status within this
 STOPPED_S = 1.5  # after whatever died: the motor stands still
@@ -134,13 +134,20 @@ EVERY_MOTION: dict[str, Any] = {"cameras": ("ip1", "driving"), "firmware": {"dri
 GOALS: Mapping[str, Motion] = {"ip1": REGULATED, "driving": DRIVEN}
 
 
-def kill_service(flat: SmallFlat, moving: Mapping[str, Motion] = MOVING) -> float:
-    """kill -9 of the cameras' services in the middle of their motions; seconds until every motor stands still."""
+def kill_service(
+    flat: SmallFlat, moving: Mapping[str, Motion] = MOVING, *, first: Callable[[int, Door], None] = lambda *_: None
+) -> float:
+    """kill -9 of the cameras' services in the middle of their motions; seconds until every motor stands still.
+
+    `first`: what happens to each service, at its camera's door, before that and while the motors turn.
+    """
     doors = [flat.doors[camera] for camera in moving]
     services = [flat.pid(f"camera-{camera}") for camera in moving]
     with flat.client("service/+/status", "camera/#") as bus:
         turn(bus, flat, moving)
         bus.forget()
+        for service, door in zip(services, doors, strict=True):
+            first(service, door)
         for service in services:
             os.kill(service, signal.SIGKILL)
         seconds = until_still(*doors)
@@ -152,6 +159,24 @@ def kill_service(flat: SmallFlat, moving: Mapping[str, Motion] = MOVING) -> floa
             wait(bus, lambda camera=camera: online(bus, camera), 5.0, "the new one to have met the camera")  # type: ignore[misc]
             takes_orders(bus, camera)
     return seconds
+
+
+def kill_watchdog(flat: SmallFlat, moving: Mapping[str, Motion] = MOVING) -> float:
+    """kill -9 of the watchdogs first, and of the services when other ones are at work."""
+    return kill_service(flat, moving, first=_lose_watchdog)
+
+
+def _lose_watchdog(service: int, door: Door) -> None:
+    """Returns when another one has logged in: nobody else asks where it looks without a login meanwhile."""
+    logins = partial(_challenged, door)
+    before, (_, watchdog) = logins(), family(service)
+    os.kill(watchdog, signal.SIGKILL)
+    peers.wait_until(lambda: logins() > before, "another watchdog", 10.0)
+    assert door.moving
+
+
+def _challenged(door: Door) -> int:
+    return sum(entry["status"] == 401 and "getStatus" in entry["target"] for entry in door.log())
 
 
 def end_service(flat: SmallFlat, *, camera: str = "ip1") -> float:
@@ -170,13 +195,13 @@ def end_service(flat: SmallFlat, *, camera: str = "ip1") -> float:
 
 def kill_supervisor(flat: SmallFlat, moving: Mapping[str, Motion] = MOVING) -> float:
     """kill -9 of the supervisor in the middle of motions; seconds until the motors stand still. Nobody is left over."""
-    doors, family = [flat.doors[camera] for camera in moving], flat.processes
-    assert len(family) > 2, "the supervisor, a service and a watchdog"
+    doors, everybody = [flat.doors[camera] for camera in moving], flat.processes
+    assert len(everybody) > 2, "the supervisor, a service and a watchdog"
     with flat.client("camera/#") as bus:
         turn(bus, flat, moving)
         os.kill(flat.process.pid, signal.SIGKILL)
         seconds = until_still(*doors)
-        end_orphans(family)
+        end_orphans(everybody)
         rests(*doors)
     flat.start_services()
     return seconds
@@ -346,7 +371,7 @@ def apart(one: float, other: float) -> float:
     return abs((one - other + 180) % 360 - 180)
 
 
-KILLS = (kill_service, kill_supervisor, kill_broker)
+KILLS = (kill_service, kill_watchdog, kill_supervisor, kill_broker)
 MOTIONS = (MOVING, GOALS)
 
 

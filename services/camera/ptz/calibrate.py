@@ -96,7 +96,7 @@ def _leg(limits: Limits, skill: Skill, axis: int, speed: int, near: Reading, mos
     It turns for `most` seconds, or for a part of the time until the end stop; a late stop ends it before that, too.
     """
     reading, now = yield from settle(near)
-    helm = Helm(Goal(limits.pose(reading)), limits, skill)
+    helm = Helm(Goal(limits.pose(reading)), limits, skill, now + MOVE_S)
     helm.stand(reading)
     low, high = limits.ranges[axis]
     here = helm.course.origin[axis]

@@ -25,6 +25,10 @@ class Goal:
     clamped: bool = False
     near: float = 0.0
 
+    def __str__(self) -> str:
+        pan, tilt, zoom = self.pose
+        return f"pan {pan % 360:.1f} tilt {tilt:.1f} zoom {zoom:g}"
+
 
 @dataclass(frozen=True)
 class Limits:

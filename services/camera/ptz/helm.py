@@ -15,6 +15,7 @@ from services.camera.ptz.pace import ACT_PART, HALF_CHANGE, READ_LATE, READ_PART
 from services.camera.ptz.skill import LATE_PART, Skill
 from services.camera.ptz.stand import LOST
 from services.camera.ptz.stand import stop as until_confirmed
+from services.errors import DeviceError
 
 NEAR_LEVELS = 0.5
 END_LEVELS = 0.3  # zoom ends so far from the ends of its range
@@ -37,14 +38,18 @@ Levels = tuple[int, int, int]
 
 
 class Helm:
-    """One move. `commands` counts what was sent, `stuck` legs without effect; `zoom_ends`: when to end a zoom."""
+    """One move. `commands` counts what was sent, `stuck` legs without effect; `zoom_ends`: when to end a zoom.
 
-    def __init__(self, goal: Goal, limits: Limits, skill: Skill) -> None:
-        self.goal, self.limits, self.skill = goal, limits, skill
+    After an answer later than `until`, seconds since 1970, nothing but a stop is sent for it.
+    """
+
+    def __init__(self, goal: Goal, limits: Limits, skill: Skill, until: float) -> None:
+        self.goal, self.limits, self.skill, self.until = goal, limits, skill, until
         ends = zip(goal.pose[:ZOOM], limits.ranges, strict=False)
         pan, tilt = (min(high - EDGE_DEG, max(low + EDGE_DEG, value)) for value, (low, high) in ends)
         self.aim: Pose = (pan, tilt, goal.pose[ZOOM])
         self.commands = self.stuck = 0
+        self._heard = 0.0
         self.turned: set[int] = {PAN, TILT}  # since it was last judged where they rest
         self.zoom_ends: float | None = None
         self.foretold = False  # whether where it stands was
@@ -76,9 +81,12 @@ class Helm:
         self.course.stand(self.pose(reading))
 
     def send(self, request: Request) -> Plan[Reply]:
-        """Sends, counts, and takes in how long it took."""
+        """Sends, counts, and takes in how long it took; DeviceError after the deadline."""
+        if self._heard > self.until:
+            raise DeviceError(f"did not arrive at {self.goal}, in time")
         self.commands += 1
         reply = yield from ask(request)
+        self._heard = reply.received
         self.skill.timed(reply.received - reply.sent)
         if isinstance(reply.result, Reading):
             self.skill.hear(reply.result.moving)

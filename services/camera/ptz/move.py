@@ -69,7 +69,7 @@ class Move:
 
     def __init__(self, goal: Goal, limits: Limits, skill: Skill, until: float, presets: Mapping[int, Pose]) -> None:
         self.until = until
-        self.helm = Helm(goal, limits, skill)
+        self.helm = Helm(goal, limits, skill, until)
         self.zooming = Zooming(self.helm)
         self.turning = Turning(self.helm, self.zooming)
         self.homing = Homing(self.helm, self.turning.watch)
@@ -158,8 +158,7 @@ class Move:
             self.helm.stuck += 1
 
     def _failed(self, reading: Reading, why: str) -> str:
-        pan, tilt, zoom = self.helm.goal.pose
         return (
-            f"did not arrive at pan {pan % 360:.1f} tilt {tilt:.1f} zoom {zoom:g}, {why}; "
+            f"did not arrive at {self.helm.goal}, {why}; "
             f"it is at pan {reading.pan:.1f} tilt {reading.tilt:.1f} zoom {reading.zoom:g}"
         )

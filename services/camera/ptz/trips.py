@@ -8,7 +8,7 @@ from __future__ import annotations
 from services.camera.bulletin import Bulletin
 from services.camera.capabilities import Abilities
 from services.camera.device import Identity, Picture
-from services.camera.orders import GotoPlace, LookAt
+from services.camera.orders import Calibration, Command, GotoPlace, LookAt, MoveBy
 from services.camera.places import Places
 from services.camera.plan import Plan
 from services.camera.ptz.calibrate import calibrate
@@ -51,22 +51,22 @@ class Trips:
         )
 
     def plan(self, command: GotoPlace | LookAt, now: float) -> Plan[Arrival]:
-        """The move; what it taught is kept."""
+        """The move."""
         self._believe()
         near, until = self.bulletin.at_rest(now), now + self.config.move_timeout_s
         goal, limits, presets = self.goal(command), self.config.limits, self._presets()
-        try:
-            return (yield from goto(goal, limits, self.skill, until, near=near, presets=presets))
-        finally:
-            self.kept.save(self.skill)
+        return (yield from goto(goal, limits, self.skill, until, near=near, presets=presets))
 
     def calibrate(self) -> Plan[Arrival]:
-        """Learns the motors on purpose; it is on the disk when that is done."""
+        """Learns the motors on purpose."""
         self._believe()
-        try:
-            return (yield from calibrate(self.config.limits, self.skill))
-        finally:
+        return (yield from calibrate(self.config.limits, self.skill))
+
+    def keep(self, command: Command | None) -> None:
+        """What an order taught is kept, once it has ended; of a calibration, on the disk by now."""
+        if not isinstance(command, MoveBy):
             self.kept.save(self.skill)
+        if isinstance(command, Calibration):
             self.kept.written()
 
     def _believe(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from dataclasses import dataclass, field, replace
+from math import inf
 from statistics import median
 from typing import Literal
 
@@ -223,7 +224,7 @@ def test_with_no_commands_left_one_hop_and_a_look_are_fewer_than_a_start_its_end
     skill = Skill(honours={"Position": "yes"})
     for sense in skill.senses:
         sense.sure = True
-    helm = Helm(LIMITS.goal(12.0, 21.0, 0.0), LIMITS, skill)
+    helm = Helm(LIMITS.goal(12.0, 21.0, 0.0), LIMITS, skill, inf)
     helm.stand(Reading(10.0, 20.0, 0.0, False))
     helm.commands = bounds.COMMANDS - 2
     assert isinstance(next(Hopping(helm).hop(1000.0)), MoveOver)

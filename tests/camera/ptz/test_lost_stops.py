@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,3 +65,23 @@ def test_what_somebody_else_turns_later_is_left_alone(trial: VirtualScan) -> Non
     trial.flat.until(lambda: False, 15.0)
     assert moves(trial)
     assert trial.inside.device.ptz.commands == commands
+
+
+def test_a_move_ends_although_somebody_else_turns_the_camera_again_and_again(trial: VirtualScan) -> None:
+    motors, flat, ways = trial.inside.device.ptz.motors, trial.flat, itertools.cycle(("Left", "Right"))
+    again = flat.now + 4.0
+
+    def over() -> bool:
+        nonlocal again
+        if flat.now >= again:
+            again += 0.4
+            motors.start(next(ways), 0, 5, flat.now, flip=True, mirror=True)
+        return not trial.service.motors.busy
+
+    flat.client.forget()
+    flat.client.say("camera/ip1/position/set", '{"pan": 300, "tilt": 60}')
+    assert flat.until(lambda: trial.service.motors.busy, 5.0)
+    assert flat.until(over, 75.0)  # its deadline is 60 s
+    [end] = [one for one in trial.answers() if one.final]
+    assert (end.state, "in time" in str(end.error)) == ("failed", True), end
+    assert comes_to_rest(trial)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from itertools import islice
+from math import inf
 from statistics import mean
 from typing import cast
 
@@ -121,7 +122,7 @@ def test_answers_that_a_network_holds_up_hardly_delay_the_end() -> None:
 
 def test_a_zoom_that_still_moves_where_it_should_rest_is_looked_at_until_it_does() -> None:
     motors, skill = Motors(absolute="full", zoom=6.0, zoom_rate=1.0), Skill(zoom_rate=ZoomRate(4.0, 0.05))
-    helm, to = Helm(LIMITS.goal(90.0, 20.0, 8.0), LIMITS, skill), (90.0, 20.0, 8.0)
+    helm, to = Helm(LIMITS.goal(90.0, 20.0, 8.0), LIMITS, skill, inf), (90.0, 20.0, 8.0)
     motors.answer(MoveTo(*to, "PositionABS"))
     motors.pass_time(1.3)
     end = Arriving(helm, to, Glide(998.7, 6.0, 0.0, 8.0, 4.0, 40.0, 998.7), certain=True)

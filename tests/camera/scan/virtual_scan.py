@@ -20,7 +20,7 @@ from services.bus import Message
 from services.camera.scan.analysis import Analysed, Task
 from services.camera.scan.search import Scan
 from services.camera.service import CameraService
-from services.payloads import ScanResult, ScanState
+from services.payloads import OrderResult, ScanResult, ScanState
 from services.simulators.camera.config_tables import Tables
 from services.simulators.camera.motors import Pose
 from services.simulators.camera.program import Inside
@@ -91,6 +91,11 @@ class VirtualScan:
     def states(self) -> list[ScanState]:
         """The states of scans that were said since the last order."""
         said = [one for one in self._said() if one.topic == "camera/ip1/scan/state"]
+        return [read(one, self.flat.now).payload for one in said]
+
+    def answers(self) -> list[OrderResult]:
+        """What was said of orders since then."""
+        said = [one for one in self._said() if one.topic == "camera/ip1/order_result"]
         return [read(one, self.flat.now).payload for one in said]
 
     def _said(self) -> list[Message]:
