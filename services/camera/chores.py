@@ -22,12 +22,13 @@ from services.camera.video.feed import Feed
 
 # These are taken while it is away too; a stream can be switched off then.
 WITHOUT_CAMERA = orders.ShowScan | orders.Targets | orders.Routine | orders.Broadcast | TakeLens
+PICTURE = orders.Options | commands.VideoMode | commands.HideLens  # after these all of it is another one
 DOWN_S = 20.0  # a camera that still answers so long after the order does not reboot (or was too quick to be seen)
 UP_S = 180.0  # 40 to 105 s were seen
 
 
 class Chores:
-    """Makes the plan for each of these orders."""
+    """Makes the plan for each of these orders. `changing`: how many that change the picture are being carried out."""
 
     def __init__(
         self,
@@ -46,6 +47,7 @@ class Chores:
         self.looks = Looks(bulletin.facts)
         self.keeper = Keeper(trips.places, bulletin, trips.abilities)
         self.takes = takes
+        self.changing = 0
         self._plans: dict[type, Callable[[Any, float], Plan[None]]] = {
             orders.SavePlace: self.keeper.save,
             orders.RemovePlace: self.keeper.remove,
@@ -64,7 +66,15 @@ class Chores:
 
     def plan(self, command: Command, now: float) -> Plan[None]:
         """The plan; it raises Refused or another DeviceError when the order cannot be carried out."""
-        return self._plans[type(command)](command, now)
+        plan = self._plans[type(command)](command, now)
+        return self._change(plan) if isinstance(command, PICTURE) else plan
+
+    def _change(self, plan: Plan[None]) -> Plan[None]:
+        self.changing += 1
+        try:
+            yield from plan
+        finally:
+            self.changing -= 1
 
     def _show(self, order: orders.ShowScan, now: float) -> Plan[None]:
         self.scanner.show = order.on

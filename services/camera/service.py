@@ -139,7 +139,7 @@ class CameraService:
         return self._flush()
 
     def _watch_motion(self, now: float) -> None:
-        turning = self.motors.busy or self.bulletin.turning or self.scanner.modes.leaving
+        turning = self.motors.busy or self.bulletin.turning or self.scanner.modes.leaving or self.chores.changing > 0
         motion = self.motion.tick(now, turning=turning, online=self.health.online)
         if motion is not None:
             self.bulletin.say(topics.CAMERA_MOTION, motion)

@@ -81,7 +81,7 @@ class Watchdog:
         status = process.wait()
         if self._closing.is_set():
             return
-        log.error("the watchdog has ended with %d; another one begins in %.0f s", status, AGAIN_S)
+        log.error("the watchdog has ended with %d; another one begins", status)
         self._closing.wait(AGAIN_S)
         with self._changing:
             if not self._closing.is_set():

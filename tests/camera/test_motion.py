@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from services.bus import Message
 from services.camera.alarm.listener import HEARD, Heard
 from services.camera.alarm.motion import MotionWatch
 from services.camera.device import Away, Event, Refused, Reply, Request
-from services.camera.errands import GetMotion
+from services.camera.errands import GetMotion, SetPrivacy
 from services.camera.plan import Plan, Run, Stage
 from services.camera.scan.modes import Before
 from services.errors import DeviceError
@@ -123,26 +125,58 @@ def test_what_the_camera_sees_while_it_turns_is_no_motion_and_for_2_s_after() ->
     assert room.values == [0, 1]
 
 
+class Alarm:
+    """A camera's service whose alarm is attached."""
+
+    def __init__(self, folder: Path) -> None:
+        self.flat = Flat(folder).online()
+        self.flat.service.motion.on = True
+        assert self.hear(attached=True) == [0]
+        self.flat.run(2.0)
+
+    def hear(self, **heard: Any) -> list[int]:
+        """What was said so far."""
+        self.flat.inbox.append(Message(HEARD, value=Heard(self.flat.now, **heard)))
+        self.flat._turn()
+        return [one["value"] for one in self.flat.payloads("motion")][1:]  # the first is of an alarm that was off
+
+    def is_masked(self) -> bool:
+        """Whether what it sees now is nothing, and is something 3 s later."""
+        before, after = self.hear(events=(START,)), self.hear(events=(STOP,))
+        self.flat.run(3.0)
+        return (before, after, self.hear(events=(START,))) == ([0], [0], [0, 1])
+
+
 def test_a_picture_that_is_put_back_after_a_scan_is_no_motion(tmp_path: Path) -> None:
-    flat = Flat(tmp_path).online()
-    flat.service.motion.on = True
-
-    def hear(**heard: Any) -> list[int]:
-        flat.inbox.append(Message(HEARD, value=Heard(flat.now, **heard)))
-        flat._turn()
-        return [one["value"] for one in flat.payloads("motion")][1:]  # the first is of an alarm that was off
-
-    assert hear(attached=True) == [0]
-    flat.run(2.0)
-    modes = flat.service.scanner.modes
+    alarm = Alarm(tmp_path)
+    flat, modes = alarm.flat, alarm.flat.service.scanner.modes
     modes.noted, modes.changed = Before(("bw",) * 3), True
     flat.service.stage.begin(flat.service.scanner.restored(), flat.now, lambda run, now: None)
     flat._turn()
     flat.until(lambda: flat.camera.picture.mode == "bw")
-    assert hear(events=(START,)) == [0]
-    assert hear(events=(STOP,)) == [0]
-    flat.run(3.0)
-    assert hear(events=(START,)) == [0, 1]
+    assert alarm.is_masked()
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("Flip", "False"), ("Mirror", "False"), ("VideoMode", "bw"), ("Privacy", "True")]
+)
+def test_a_picture_that_an_order_changes_is_no_motion(tmp_path: Path, key: str, value: str) -> None:
+    alarm = Alarm(tmp_path)
+    alarm.flat.camera.answers[SetPrivacy] = lambda asked: asked.on
+    alarm.flat.order(key, value)
+    alarm.flat.until(alarm.flat.ended)
+    assert alarm.is_masked()
+
+
+def test_nor_is_it_while_the_order_is_carried_out_and_what_changes_no_picture_masks_nothing(tmp_path: Path) -> None:
+    alarm = Alarm(tmp_path)
+    alarm.flat.order("VideoMode", "bw", order_id="a")
+    assert alarm.hear(events=(START,)) == [0]
+    assert alarm.hear(events=(STOP,)) == [0]
+    alarm.flat.until(lambda: alarm.flat.ended("a"))
+    alarm.flat.run(3.0)
+    alarm.flat.order("SetTarget", "7", order_id="b")
+    assert alarm.hear(events=(START,)) == [0, 1]
 
 
 def test_motion_from_before_a_turn_still_counts() -> None:
