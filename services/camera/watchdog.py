@@ -42,7 +42,7 @@ class Watchdog:
     def __init__(self, brand: str, address: Address) -> None:
         self._address = json.dumps({"brand": brand, "address": _encode(address)})
         self._turns: str | None = None  # the last word; None: none was said yet
-        self._changing = threading.RLock()
+        self._changing = threading.Lock()
         self._closing = threading.Event()
         self.process = self._begin()
 

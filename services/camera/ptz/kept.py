@@ -142,7 +142,7 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
         steady=skill.steady,
         diagonals=skill.diagonals,
         zoom_steps=skill.zoom_steps,
-        zoom_rate=skill.zoom_rate.known(),
+        zoom_rate=skill.zoom_rate.guess,
         zoom_fits=skill.zoom_rate.fits,
         honours=skill.honours,
         beside=skill.beside,

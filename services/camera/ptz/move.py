@@ -68,7 +68,6 @@ class Move:
     """One move, put together from its parts."""
 
     def __init__(self, goal: Goal, limits: Limits, skill: Skill, until: float, presets: Mapping[int, Pose]) -> None:
-        self.until = until
         self.helm = Helm(goal, limits, skill, until)
         self.zooming = Zooming(self.helm)
         self.turning = Turning(self.helm, self.zooming)
@@ -87,8 +86,10 @@ class Move:
                 out = self._out(reading)
             if not out and self.helm.zoom_ends is None:
                 return Arrival(reading, now, self.helm.goal.clamped, self.helm.rests)
-            if now > self.until or self.helm.stuck >= STUCK:
-                raise DeviceError(self._failed(reading, "in time" if now > self.until else "the camera does not turn"))
+            if now > self.helm.until or self.helm.stuck >= STUCK:
+                raise DeviceError(
+                    self._failed(reading, "in time" if now > self.helm.until else "the camera does not turn")
+                )
             before = self.helm.limits.pose(reading)
             driven = yield from self._driven(reading, out, now)
             if driven is not None:

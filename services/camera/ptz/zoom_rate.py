@@ -38,6 +38,7 @@ class ZoomRate:
 
         With them, the guess is what else may be.
         """
+        self._began: tuple[float, float] | None = (rate, doubt)  # None: it was looked at since
         before = np.exp(-np.square(np.log(RATES / rate) / doubt) / 2)
         self._likely: Grid = before * np.exp(-SLOWS_S / OFTEN_S)  # [seconds to its rate; rate]
         if fits:
@@ -55,6 +56,14 @@ class ZoomRate:
         fits = np.stack([RATES[rates], SLOWS_S[slows, 0], share[slows, rates]], axis=1).round(4)
         return [(rate, seconds, likely) for rate, seconds, likely in fits.tolist()]
 
+    @property
+    def guess(self) -> tuple[float, float]:
+        """What another one may begin with: a rate, and which share of it is doubted, as it began until it was seen."""
+        if self._began is not None:
+            return self._began
+        rate = self._mean(np.log(RATES))
+        return float(np.exp(rate)), max(EXACT, self._mean(np.square(np.log(RATES) - rate)) ** 0.5)
+
     def comes(self, ways: Iterable[float], after: float) -> float | None:
         """When it has probably come the next of some ways, seconds from its beginning; None: all are behind it."""
         times = (self._mean(way / RATES + SLOWS_S / 2) for way in ways)
@@ -65,6 +74,7 @@ class ZoomRate:
 
         `doubt`: standard deviation of the seconds.
         """
+        self._began = None
         self._likely = (self._likely / self._likely.max()) ** KEPT
         gains = np.minimum(seconds, SLOWS_S)
         way = RATES * (gains * gains / (2 * np.maximum(SLOWS_S, 1e-6)) + seconds - gains)

@@ -202,9 +202,12 @@ def test_what_looks_have_not_told_of_zoom_does_not_fill_the_disk_with_every_move
     kept.written()
     assert kept.file is not None
     assert kept.file.stat().st_size < 30_000
-    again = Skill()
-    Kept(tmp_path, "ip1").recall(Identity("M", "S1", "V1"), again)
-    assert again.zoom_rate.known() == pytest.approx(skill.zoom_rate.known(), rel=0.25)
+    for _ in range(10):  # starts, after each of which it is kept once more
+        again, kept = Skill(), Kept(tmp_path, "ip1")
+        kept.recall(Identity("M", "S1", "V1"), again)
+        assert again.zoom_rate.known() == pytest.approx(skill.zoom_rate.known(), rel=0.1)
+        kept.save(again)
+        kept.written()
 
 
 def test_a_file_that_cannot_be_read_is_as_none(tmp_path: Path) -> None:
