@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from services.camera.ptz.kept import recalled
 from services.camera.scan.analysis import Analysed
 from services.camera.scan.findings import Frame
 from services.camera.scan.footage import Glimpse, Visit
@@ -49,6 +50,21 @@ def answers(trial: VirtualScan) -> list[dict[str, Any]]:
     """How orders ended."""
     said = [json.loads(one.payload) for one in trial.flat.client.seen if one.topic == "camera/ip1/order_result"]
     return [one for one in said if one["state"] in FINAL]
+
+
+@pytest.mark.parametrize("cancelled", [False, True])
+def test_what_a_scan_taught_of_the_motors_is_kept(trial: VirtualScan, tmp_path: Path, *, cancelled: bool) -> None:
+    def cancel() -> None:
+        trial.flat.client.say("camera/ip1/order/Scan", "False")
+
+    _, _, state = trial.run(ORDER, once(lambda scan: cancelled and len(scan.findings.taken) >= 12, cancel))
+    assert state.state == ("cancelled" if cancelled else "done")
+    trial.service.trips.kept.written()
+    kept, taught = recalled(tmp_path / "state", "ip1"), trial.service.trips.skill
+    assert kept is not None
+    assert kept.timing.took == taught.timing.took  # how long answers take
+    assert kept.presets == taught.presets
+    assert len(taught.presets) >= 2  # where the first of its places were seen to look
 
 
 @pytest.mark.parametrize("frames", [0, 5, 12, 20])
