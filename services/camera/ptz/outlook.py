@@ -16,6 +16,7 @@ from services.camera.ptz.pace import Pace, Rates
 from services.camera.ptz.skill import DITHER_DEG, Skill
 
 NOISE_DEG = 0.05  # of a reading, beside what is learnt
+SELDOM = 1.0  # of the spread of answers: so much farther beside it now and then a leg ends
 EARLY = 0.5  # of what a late end would add: so much sooner a last leg ends
 LAST = 5  # commands: a leg with no more left is the last one
 CORRECTION_S = 2.0  # a correction takes about so many answers, since it often begins without a reading
@@ -73,16 +74,17 @@ class Outlook:
         every = [way.rates for way in self.ways.values()]
         learnt = all(2 * sum(map(rates.known, rates.speeds)) >= len(rates.speeds) for rates in every)
         self._thrifty = len(every) > 1 and learnt  # one axis has commands enough, and what is not known is to be seen
-        self._dithers = self.skill.dithers and learnt
+        self._careful = learnt  # before that it would creep
 
     def rung(self, left: int) -> float:
         """What the command costs that ends a leg early and goes on slower, seconds; `left` commands with it."""
         return RUNG_S if self._thrifty and left <= FEW else 0.0
 
     def spread(self, axis: int, speed: int, held: float, left: int) -> float:
-        """How far from where it should a leg may end, or be read to; what dithers counts where it is the last one."""
-        dither = DITHER_DEG if self._dithers and left <= LEG else 0.0
-        return spread_of(self.ways[axis].rates, speed, held, self.skill) + dither
+        """How far from where it should a leg may end, or be read to; of the last one what is seldom counts, too."""
+        rates = self.ways[axis].rates
+        seldom = DITHER_DEG if self.skill.dithers else SELDOM * rates.rate(speed) * self.skill.timing.spread
+        return spread_of(rates, speed, held, self.skill) + (seldom if left <= LEG and self._careful else 0.0)
 
     def short(self, axis: int, speed: int, distance: float, left: int) -> float:
         """How far before the goal a leg has to end at the latest, for fear of a late end; no more than the distance.
