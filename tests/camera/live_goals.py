@@ -49,7 +49,7 @@ class LiveRow:
     """Goals on one firmware; `virtual`: the same ratio without the service, in virtual time.
 
     `commands`: the most that the camera took during one, the service's other questions too. `kept`: the share of its
-    frame rate that the simulator kept meanwhile.
+    frame rate that the simulator kept meanwhile. `beyond`: the goals that were beyond a bound, with all that was asked.
     """
 
     firmware: str
@@ -64,6 +64,29 @@ class LiveRow:
     pushed: float
     failed: int
     kept: float
+    beyond: list[Met]
+
+
+@dataclass
+class Met:
+    """One goal, and what became of it; `asked`: by the service meanwhile, with the seconds since it was ordered."""
+
+    number: int
+    start: Goal
+    goal: Goal
+    state: str
+    seconds: float
+    least: float
+    off: float
+    pushed: float
+    commands: int
+    asked: list[str]
+
+    @property
+    def beyond(self) -> bool:
+        """Whether it broke a bound."""
+        many, far = self.commands > bounds.COMMANDS, self.off > bounds.OFF_DEG
+        return many or far or self.pushed > 0 or self.state != "done"
 
 
 def rows(goals: int = bounds.GOALS, seed: int = 1) -> Iterator[LiveRow]:
@@ -83,7 +106,7 @@ def _row(case: tuple[str, bool], goals: list[Goal], seed: int) -> LiveRow:
 
 
 def _measured(firmware: str, calibrated: bool, folder: Path, goals: list[Goal], seed: int) -> LiveRow:
-    found: list[_Met] = []
+    found: list[Met] = []
     rng = Random(seed)
     with small_flat(folder, simulator={"profile": firmware, "seed": seed}) as flat, flat.client("camera/ip1/#") as bus:
         door = flat.doors["ip1"]
@@ -91,10 +114,9 @@ def _measured(firmware: str, calibrated: bool, folder: Path, goals: list[Goal], 
             learnt = bus.order("ip1", "CalibratePtz", "True", timeout_s=CALIBRATES_S)
             assert learnt.state == "done", learnt
         with shown(bus), watched(flat, SUBSTREAM) as kept:
-            for goal in goals:
+            for number, goal in enumerate(goals):
                 bus.collect(rng.uniform(*PAUSE_S))
-                found.append(_met(bus, door, goal, firmware))
-        pushed = motors(door)["pushed_s"]
+                found.append(_met(bus, door, number, goal, firmware))
     return LiveRow(
         firmware=firmware,
         calibrated=calibrated,
@@ -105,9 +127,10 @@ def _measured(firmware: str, calibrated: bool, folder: Path, goals: list[Goal], 
         bound=wanted(PROFILES[firmware], calibrated=calibrated),
         commands=max(one.commands for one in found),
         off=max(one.off for one in found),
-        pushed=pushed["pan"] + pushed["tilt"],
+        pushed=sum(one.pushed for one in found),
         failed=sum(one.state != "done" for one in found),
         kept=kept[0],
+        beyond=[one for one in found if one.beyond],
     )
 
 
@@ -131,36 +154,39 @@ def shown(bus: Client) -> Iterator[None]:
         viewer.join()
 
 
-def motors(door: Door) -> Any:
-    """The constants of the simulated motors, and what they have done."""
-    return httpx.get(f"{door.url}/motors", timeout=30).json()
+def pushed(door: Door) -> float:
+    """For how long pan and tilt were pushed against their ends by now, seconds."""
+    told = httpx.get(f"{door.url}/motors", timeout=30).json()["pushed_s"]
+    return float(told["pan"] + told["tilt"])
 
 
-@dataclass
-class _Met:
-    """One goal, and what became of it."""
-
-    state: str
-    seconds: float
-    least: float
-    off: float
-    commands: int
-
-
-def _met(bus: Client, door: Door, goal: Goal, firmware: str) -> _Met:
+def _met(bus: Client, door: Door, number: int, goal: Goal, firmware: str) -> Met:
     """Orders it, and looks at the truth when its end is told."""
-    before = door.state()
-    pose, passed = before["pose"], before["door"]["passed"]
-    least = least_time((pose["pan"], pose["tilt"], pose["zoom"]), goal, constants(PROFILES[firmware]))
+    before, pushed_before = door.state(), pushed(door)
+    start: Goal = (before["pose"]["pan"], before["pose"]["tilt"], before["pose"]["zoom"])
     bus.forget()
-    began = time.monotonic()
+    ordered, began = time.time(), time.monotonic()
     bus.say("camera/ip1/position/set", json.dumps(dict(zip(("pan", "tilt", "zoom"), goal, strict=True))))
     ended = bus.payload("camera/ip1/order_result", lambda result: result.final, LIMIT_S)
     seconds = time.monotonic() - began
     truth = door.state()
-    there, moving = truth["pose"], truth["moving"]
-    off = max(abs(LIMITS.unwrap(there["pan"]) - LIMITS.unwrap(goal[0])), abs(there["tilt"] - goal[1]))
-    return _Met("moving" if moving else ended.state, seconds, least, off, truth["door"]["passed"] - passed)
+    there = truth["pose"]
+    return Met(
+        number=number,
+        start=start,
+        goal=goal,
+        state="moving" if truth["moving"] else ended.state,
+        seconds=seconds,
+        least=least_time(start, goal, constants(PROFILES[firmware])),
+        off=max(abs(LIMITS.unwrap(there["pan"]) - LIMITS.unwrap(goal[0])), abs(there["tilt"] - goal[1])),
+        pushed=pushed(door) - pushed_before,
+        commands=truth["door"]["passed"] - before["door"]["passed"],
+        asked=[_line(one, ordered) for one in door.log() if one["time"] >= ordered],
+    )
+
+
+def _line(asked: dict[str, Any], ordered: float) -> str:
+    return f"{asked['time'] - ordered:.2f} {asked['status']} {asked['target']}"
 
 
 def table(found: list[LiveRow]) -> Table:
@@ -168,7 +194,7 @@ def table(found: list[LiveRow]) -> Table:
     title = f"random goals in real time, from order to answer; counts where {ENOUGH:.0%} of the frame rate was kept"
     columns = ("firmware", "goals", "median s", "over the least time", "virtual", "wanted", "most commands",
                "worst off", "pushed", "failed", "kept")  # fmt: skip
-    shown = Table(*columns, title=title)
+    shown = Table(*columns, title=title, caption="what was asked in goals beyond a bound: `beyond` in bench.json")
     for row in found:
         ratios = f"{row.ratio:.2f}", f"{row.virtual:.2f}", f"<= {row.bound}"
         rest = str(row.commands), f"{row.off:.2f} deg", f"{row.pushed:.1f} s", str(row.failed), f"{row.kept:.0%}"
