@@ -279,6 +279,21 @@ def test_when_the_password_is_right_again_everybody_comes_in_at_the_next_opening
     assert [visitors.get(name) for name in PIECES] == [200] * 4
 
 
+def test_a_password_that_was_wrong_and_is_right_again_is_no_random_refusal_another_change_costs_three_logins() -> None:
+    camera = Camera()
+    visitors = Visitors(camera)
+    visitors.get()
+    camera.password = "changed"
+    assert visitors.outcome("control") is BadLogin
+    camera.password = "right"
+    visitors.now += RETRY_S + 1
+    visitors.get()
+    failed, camera.password = camera.failed, "changed again"
+    while visitors.outcome("control") is Away:
+        visitors.now += 1.0
+    assert camera.failed - failed == 3
+
+
 def test_a_locked_account_is_told_and_later_asked_without_a_password() -> None:
     camera = Camera()
     visitors = Visitors(camera)

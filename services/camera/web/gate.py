@@ -34,8 +34,8 @@ class Book:
 
     A camera that has just refused a login and then taken it (`ODD_WINDOW_S`) refuses at random: there three failures
     prove less, so a few single tries follow at growing distances before it counts as a wrong password. A nonce that is
-    too old for the camera is no such refusal. Where a login has passed, two refusals prove nothing: by chance alone
-    they would shut everybody out every few hours.
+    too old for the camera is no such refusal, nor is a password that was wrong until the gate had closed. Where a login
+    has passed, two refusals prove nothing: by chance alone they would shut everybody out every few hours.
     """
 
     retry_s: float = RETRY_S
@@ -92,7 +92,7 @@ class Book:
     def passed(self, number: int, now: float) -> None:
         """A login was accepted; it says nothing about those that failed after it was sent."""
         if number == self.ever:
-            if self.odd and self.why != "locked":
+            if self.odd and not self.closings:
                 self.odd_until = now + ODD_WINDOW_S
             self.odd, self.good = False, True
             self.failures, self.closings, self.why, self.opens_at = 0, 0, "", None
