@@ -25,6 +25,7 @@ from services.virtual import VirtualApartment
 from tests import trials
 from tests.attacks import flooding
 from tests.bridge import trials as bridge_trials
+from tests.camera import sound_trials
 from tests.camera import trials as camera_trials
 from tests.camera.scan.scenes import scan_a_scene, whole_scans
 from tests.chaos import trials as chaos_trials
@@ -193,6 +194,30 @@ PARTS: dict[str, tuple[Callable[[], object], int, str]] = {
         ),
         25,
         "s until it shows",
+    ),
+    "camera-logins": (
+        lambda: cameras(lambda flat, rng: camera_trials.change_password(flat), **camera_trials.FAULTY),
+        5,
+        "logins that failed after a change of the password",
+    ),
+    "camera-idle": (
+        lambda: cameras(lambda flat, rng: camera_trials.idle(flat)),
+        5,
+        "requests a second while nobody wants anything",
+    ),
+    "camera-hears": (
+        lambda: cameras(
+            lambda flat, rng: sound_trials.record(flat, rng, rng.choice(tuple(flat.doors))), **sound_trials.SPEAKING
+        ),
+        15,
+        "Hz off, the tone of a recording",
+    ),
+    "camera-speaks": (
+        lambda: cameras(
+            lambda flat, rng: sound_trials.play(flat, rng, rng.choice(tuple(flat.doors))), **sound_trials.SPEAKING
+        ),
+        15,
+        "% like what was played",
     ),
     "bridge": (bridge, 30, "s until all flows again"),
     "persistence": (lambda: writer(writer_trials.trouble), 100, "messages, none lost or doubled"),

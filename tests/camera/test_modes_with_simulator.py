@@ -1,4 +1,4 @@
-"""Sound, privacy, video modes and the clock by orders, on the simulated camera: the effect there, and the answers."""
+"""Privacy, video modes and the clock by orders, on the simulated camera: the effect there, and the answers."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import numpy as np
 import pytest
 
-from services.camera.sound import g711, wav
 from services.simulators import camera as simulated
 from tests.camera.bench import Bench, bench, simulator
 
@@ -37,34 +35,6 @@ def done(here: Bench, key: str, value: str, number: int = 1) -> dict[str, Any]:
 
 def table(here: Bench, key: str) -> str:
     return here.camera.server.device.tables.text(key)
-
-
-def test_a_recording_holds_the_microphones_tone(here: Bench, tmp_path: Path) -> None:
-    here.tell("tone", hertz=1234.0)
-    assert done(here, "AudioRec", "1.5")["state"] == "done"
-    (told,) = here.payloads("audio")
-    file = tmp_path / "audio" / told["file"]
-    assert (told["seconds"], told["bytes"]) == (1.5, file.stat().st_size)
-    sound, rate = wav.read(file.read_bytes())
-    assert (rate, len(sound)) == (8000, 12000)
-    spectrum = np.abs(np.fft.rfft(sound * np.hanning(len(sound))))
-    assert abs(np.argmax(spectrum) * rate / len(sound) - 1234.0) < 2.0
-    assert spectrum.max() > 20 * np.median(spectrum)
-
-
-def test_what_is_played_arrives_at_the_loudspeaker(here: Bench, tmp_path: Path) -> None:
-    at = np.arange(int(1.5 * 44100)) / 44100
-    sweep = 0.6 * np.sin(2 * np.pi * (300 * at + 400 * at**2))
-    (tmp_path / "audio").mkdir()
-    (tmp_path / "audio" / "doorbell.wav").write_bytes(wav.write(wav.to_samples(sweep), 44100))
-    assert done(here, "AudioPlay", "doorbell.wav")["state"] == "done"
-    (played,) = httpx.get(f"{here.camera.side_door_url}/played", timeout=30).json()
-    assert abs(played["seconds"] - 1.5) < 0.01
-    heard, rate = wav.read(httpx.get(f"{here.camera.side_door_url}/played.wav", timeout=30).content)
-    wanted = wav.resampled(sweep, 44100)
-    assert rate == g711.RATE
-    assert len(heard) == len(wanted)
-    assert np.corrcoef(heard, wanted)[0, 1] > 0.999
 
 
 def test_the_scan_mode_is_set_and_left_again(here: Bench) -> None:
