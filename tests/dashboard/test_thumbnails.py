@@ -14,7 +14,7 @@ import pytest
 
 from services.dashboard.house import House
 from services.dashboard.http.thumbnails import AGAIN_S, STANDS_S, TOPIC, Thumbnails
-from services.dashboard.http.video import Videos
+from services.dashboard.http.video import Still, Videos
 from services.errors import Unavailable
 
 NOON = 1_784_200_000.0
@@ -27,6 +27,7 @@ class Camera:
         self.topics: dict[str, str] = {}
         self.told: list[Any] = []
         self.asked, self.away = 0, False
+        self.late = 0.0  # seconds: so old is its newest picture
         self.now = NOON
         house = SimpleNamespace(
             config=SimpleNamespace(cameras=["ip1"], state=state),
@@ -49,11 +50,12 @@ class Camera:
             self.now += 1.0
             asyncio.run(self.thumbnails.look(self.now))
 
-    async def _snapshot(self, url: str) -> bytes:
+    async def _snapshot(self, url: str) -> Still:
         self.asked += 1
         if self.away:
             raise Unavailable("it is away")
-        return cv2.imencode(".jpg", np.full((576, 1024, 3), 10 * self.asked, np.uint8))[1].tobytes()
+        grey = np.full((576, 1024, 3), 10 * self.asked, np.uint8)
+        return Still(cv2.imencode(".jpg", grey)[1].tobytes(), self.now - self.late)
 
     def shows(self, place: str) -> int | None:
         """Which of its pictures is kept of a place, the first one being 1."""
@@ -89,13 +91,23 @@ def test_one_that_turns_away_while_its_picture_comes_is_not_kept(camera: Camera)
     camera.at("Sofa")
     snapshot = camera.thumbnails.videos.snapshot
 
-    async def turns(url: str) -> bytes:
+    async def turns(url: str) -> Still:
         camera.at("Sofa", moving=True)
         return await snapshot(url)
 
     camera.thumbnails.videos.snapshot = turns  # type: ignore[method-assign]
     camera.look(STANDS_S + 1)
     assert (camera.asked, camera.shows("Sofa")) == (1, None)
+
+
+def test_a_picture_from_before_it_stood_there_is_not_kept(camera: Camera) -> None:
+    """A stream may be seconds late, where its viewers keep the computer busy."""
+    camera.late = 6.0
+    camera.at("Sofa")
+    camera.look(7)
+    assert (camera.asked > 0, camera.shows("Sofa")) == (True, None)
+    camera.look(1)
+    assert camera.shows("Sofa") == camera.asked
 
 
 def test_a_scan_is_not_disturbed(camera: Camera) -> None:

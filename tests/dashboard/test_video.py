@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Coroutine
 from typing import Any
 
@@ -131,7 +132,9 @@ async def read(stream: Any) -> None:
 def test_a_snapshot_is_a_picture_and_a_service_that_is_away_is_told() -> None:
     async def look(watched: Watched) -> None:
         snapshot = watched.url.replace("stream.mjpg", "snapshot.jpg")
-        assert (await watched.videos.snapshot(snapshot)).startswith(b"\xff\xd8")
+        still = await watched.videos.snapshot(snapshot)
+        assert still.jpeg.startswith(b"\xff\xd8")
+        assert abs(time.time() - still.exposed) < 30.0
         with pytest.raises(Unavailable, match="does not answer"):
             await watched.videos.snapshot("http://127.0.0.1:9/snapshot.jpg")
 

@@ -1,9 +1,10 @@
 """Our own stream: the newest picture for everybody who may look, as multipart JPEG, and one picture at a time.
 
-    /camera/<cam>/stream.mjpg     while MJPEG is on; X-Timestamp says when each picture was exposed
+    /camera/<cam>/stream.mjpg     while MJPEG is on
     /camera/<cam>/rtsp.mjpg       the same while RTSP is on: for who shows it on ROS and in the dashboard
     /camera/<cam>/snapshot.jpg    always: the newest picture, or a snapshot taken for it
 
+X-Timestamp says of each picture when it was exposed, as is estimated, in seconds since 1970.
 No credentials: loopback and the configured networks may look, all others get 403. Nothing else is served. The standard
 library's threading server does: a viewer is a loop that waits for a picture and writes it, and a thread each makes a
 slow one nobody else's trouble; it skips pictures, because it takes the newest one whenever it is ready.
@@ -22,7 +23,7 @@ from time import monotonic
 from typing import Any
 from urllib.parse import urlsplit
 
-from services.camera.video.newest import Newest
+from services.camera.video.newest import Encoded, Newest
 from services.camera.video.settings import Network, StreamSettings
 from services.http_doors import Doors, Visitor
 from services.payloads import RTSP_PICTURE
@@ -183,19 +184,19 @@ class Viewer(Visitor):
         found = self._newest()
         if found is None:
             return self._refuse(HTTPStatus.GATEWAY_TIMEOUT, "the camera gives no picture", ("Retry-After", "5"))
-        self._head(HTTPStatus.OK, ("Content-Type", "image/jpeg"), ("Content-Length", str(len(found))))
+        about = ("Content-Length", str(len(found.data))), ("X-Timestamp", f"{found.exposed:.3f}")
+        self._head(HTTPStatus.OK, ("Content-Type", "image/jpeg"), *about)
         if self.command != "HEAD":
-            self.wfile.write(found)
+            self.wfile.write(found.data)
         return None
 
-    def _newest(self) -> bytes | None:
+    def _newest(self) -> Encoded | None:
         newest = self.server.newest
         with newest.watched():
             number = newest.stale(FRESH_S)
             if newest.wait(number, 0.0) is None and not self.server.ask():
                 return None
-            found = newest.jpeg(number, SNAPSHOT_S)
-        return found.data if found else None
+            return newest.jpeg(number, SNAPSHOT_S)
 
     def _refuse(self, status: HTTPStatus, why: str, *more: tuple[str, str]) -> None:
         body = f"{status.value} {status.phrase}: {why}\n".encode()

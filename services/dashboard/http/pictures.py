@@ -55,9 +55,8 @@ class Gallery:
 
     async def snapshot(self, asked: Asked) -> Response:
         """The camera's."""
-        return Response(
-            await self.videos.snapshot(self._address(self._camera(asked), SNAPSHOT)), media_type="image/jpeg"
-        )
+        still = await self.videos.snapshot(self._address(self._camera(asked), SNAPSHOT))
+        return Response(still.jpeg, media_type="image/jpeg")
 
     async def scanned(self, asked: Asked) -> Response:
         """What came on `camera/<cam>/scan/image`."""

@@ -24,7 +24,8 @@ from services.whole_file import write_whole
 log = logging.getLogger(__name__)
 TOPIC = "/dashboard/thumbnails/"  # our own: the places of a camera that have one, and since when (ms)
 LOOK_S = 1.0
-STANDS_S = 3.0  # so long it stood there: the newest picture is up to a second old, and the first ones are still soft
+STANDS_S = 3.0  # so long it stood there before it is taken,
+SHARP_S = 1.0  # and so long before it was exposed: the first pictures are still soft, and the newest may be late
 AGAIN_S = 3600.0  # a younger one is not taken again
 AFTER_FAILURE_S = 120.0
 
@@ -91,7 +92,7 @@ class Thumbnails:
         if not url:
             return
         try:
-            data = await self.videos.snapshot(url)
+            still = await self.videos.snapshot(url)
         except Unavailable as error:
             log.info("no picture of %s at %s: %s", camera, place, error)
             self._not_before[camera] = now + AFTER_FAILURE_S
@@ -100,7 +101,9 @@ class Thumbnails:
         there = Position.model_validate_json(text) if text is not None else None
         if there is None or there.moving or there.place != place:
             return  # it has turned away meanwhile
-        small = await asyncio.to_thread(smaller, data)
+        if still.exposed < self._stands[camera][1] + SHARP_S:
+            return
+        small = await asyncio.to_thread(smaller, still.jpeg)
         if small is not None:
             self._taken[camera, place] = (now, small)
             self._write(camera, place, small)

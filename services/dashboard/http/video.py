@@ -38,6 +38,13 @@ class Flow(NamedTuple):
     why: str = ""
 
 
+class Still(NamedTuple):
+    """A JPEG, and when it was exposed, as the camera service estimates; seconds since 1970, nan: not told."""
+
+    jpeg: bytes
+    exposed: float
+
+
 Address = Callable[[], str]  # where the stream is now; Unavailable when nobody knows
 Tell = Callable[[str, Flow | None], None]  # of a camera; None: nobody looks
 
@@ -184,7 +191,7 @@ class Videos:
             yield head.encode() + picture + f"\r\n--{BOUNDARY}\r\n".encode()
             number, picture = await video.after(number)
 
-    async def snapshot(self, url: str) -> bytes:
+    async def snapshot(self, url: str) -> Still:
         """One picture; Unavailable when there is none."""
         try:
             async with _client(SNAPSHOT_S) as client:
@@ -193,7 +200,7 @@ class Videos:
             raise Unavailable(f"the camera service does not answer: {type(error).__name__}") from error
         if answer.status_code != 200:
             raise Unavailable(answer.text.strip()[:200])
-        return answer.content
+        return Still(answer.content, float(answer.headers.get("X-Timestamp", "nan")))
 
     async def close(self) -> None:
         """Ends all streams."""

@@ -261,10 +261,11 @@ def test_answers_are_not_kept_and_not_guessed_at(studio: Studio) -> None:
 
 
 def test_a_snapshot_is_the_newest_picture_while_one_is_fresh(studio: Studio) -> None:
-    number = studio.expose()
+    before, number = time.time(), studio.expose()
     status, headers, body = studio.get("/camera/ip1/snapshot.jpg?now=1")
     assert (status, headers["content-type"], int(headers["content-length"])) == (200, "image/jpeg", len(body))
     assert np.abs(pictures.decode(body).astype(int) - picture(number)).mean() < 3
+    assert before - 0.001 < float(headers["x-timestamp"]) < time.time()
     assert studio.asked == []
     assert studio.get("/camera/ip1/snapshot.jpg", "HEAD")[2] == b""
 
