@@ -69,7 +69,7 @@ def busy(flat: Simulated, bus: Client) -> None:
     bus.say("camera/ip1/order/RTSP", "ON")
     for place in PLACES:
         bus.order("ip1", "Goto", place)
-        bus.collect(2.5)
+        bus.collect(6.0)
     bus.order("ip1", "ScanImgPub", True)
     bus.order("ip1", "Scan", {"targets": [582, 17], "places": ["Living room", "Kitchen"]}, timeout_s=200.0)
     bus.say("mission/tiago/order", '{"find": 582, "id": "pictured"}')
