@@ -1,18 +1,22 @@
-"""The bounds that the issues name: of moves, markers and places. Tests hold to them, bench and soak print them."""
+"""The bounds that the issues name: of moves, markers and places. Tests hold to them, bench and soak print them.
+
+Those of moves are held against a camera that was calibrated, as the docs have it done first. `COLD_`: our own, of one
+that never was and learns its motors in these moves; the bench prints the others beside it all the same.
+"""
 
 from __future__ import annotations
 
-GOALS = 50  # at random in pan, tilt and zoom, on both sides of the dead arc, one after the other from a cold start
+GOALS = 50  # at random in pan, tilt and zoom, on both sides of the dead arc, one after the other
 OFF_DEG = 0.5  # the truth, when `done` is said
 MEDIAN_START_STOP = 2.0  # time over the least time of the motors, where the camera takes only start and stop
 MEDIAN_POSITIONS = 1.3  # where it honours a position, absolute or relative, or the goal is a place that has a preset
-MEDIAN_RELATIVE = 1.42  # not 1.3 where only one within the picture is, until the camera is calibrated
+COLD_MEDIAN_RELATIVE = 1.42  # not 1.3 where only one within the picture is
 MEDIAN_BESIDE = 2.0  # of start and stop from a preset that is up to PRESET_DEG beside the goal
 PRESET_DEG = 2.0
 COMMANDS = 12  # for a goal, answers to login challenges not counted
 CORRECTION = 3  # more at the very most where a camera is calibrated: one more leg, and a reading
 CALIBRATED_WITHIN_COMMANDS = 0.995  # of the goals of a calibrated camera; two late answers in one move may cost more
-WITHIN_COMMANDS = 0.95  # of the goals at least; a first goal, or one with a late answer or two, takes more
+COLD_WITHIN_COMMANDS = 0.95  # of the goals at least; a first goal, or one with a late answer or two, takes more
 
 SCAN_OVER_LEAST = 1.3  # a full scan (both picture modes, K = 8) over the least time of motors, frames and one switch
 SCAN_QUICKER = 3.5  # than the report's scan of the same places

@@ -64,18 +64,18 @@ def rows() -> list[Row]:
     bound = {name: wanted(profile) for name, profile in PROFILES.items()}
     ours = [_row(name, one, bound[name]) for name, one in found.items()]
     ours += [
-        _row(f"{name}, calibrated", outcomes(profile, goals, SEED, calibrated=True), wanted(profile, calibrated=True))
+        _row(f"{name}, calibrated", outcomes(profile, goals, SEED, calibrated=True), wanted(profile))
         for name, profile in PROFILES.items()
     ]
     ours += [
-        _row(f"{name}, calibrated, other motors", _other_motors(profile, goals), wanted(profile, calibrated=True))
+        _row(f"{name}, calibrated, other motors", _other_motors(profile, goals), wanted(profile))
         for name, profile in PROFILES.items()
     ]
     ours += [
         _row(
             f"{name}, calibrated, answers {1000 * NETWORK_S:.0f} ms late",
             outcomes(profile, goals, SEED, calibrated=True, network_s=NETWORK_S),
-            wanted(profile, calibrated=True),
+            wanted(profile),
         )
         for name, profile in PROFILES.items()
     ]

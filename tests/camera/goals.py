@@ -256,13 +256,22 @@ def named() -> dict[str, Profile]:
     return {name: replace(profile) for name, profile in PROFILES.items()}
 
 
-def wanted(profile: Profile, *, calibrated: bool = False) -> float:
+def wanted(profile: Profile) -> float:
     """The bound of the median of time over least time."""
-    if profile.position_relative == "works" and not positions(profile):
-        return bounds.MEDIAN_POSITIONS if calibrated else bounds.MEDIAN_RELATIVE
-    return bounds.MEDIAN_POSITIONS if positions(profile) else bounds.MEDIAN_START_STOP
+    return bounds.MEDIAN_POSITIONS if positions(profile) or relative(profile) else bounds.MEDIAN_START_STOP
+
+
+def wanted_cold(profile: Profile) -> float:
+    """The same of a camera that learns its motors in these goals."""
+    only_relative = relative(profile) and not positions(profile)
+    return bounds.COLD_MEDIAN_RELATIVE if only_relative else wanted(profile)
 
 
 def positions(profile: Profile) -> bool:
     """Whether it lets its firmware drive to any position, or over any way."""
     return profile.position_abs == "full" or profile.moves != "none"
+
+
+def relative(profile: Profile) -> bool:
+    """Whether it lets its firmware drive over a part of the picture."""
+    return profile.position_relative == "works"

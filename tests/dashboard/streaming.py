@@ -36,7 +36,9 @@ def camera(*, on: bool = True, shade: int = 0) -> Iterator[Streaming]:
     def expose() -> None:
         while not ended.wait(EVERY_S):
             if not made.stands.is_set():
-                newest.put(lambda: np.full((90, 160, 3), shade, np.uint8), Exposure(newest.clock(), 0.0), newest.clock())
+                newest.put(
+                    lambda: np.full((90, 160, 3), shade, np.uint8), Exposure(newest.clock(), 0.0), newest.clock()
+                )
 
     source = threading.Thread(target=expose)
     source.start()

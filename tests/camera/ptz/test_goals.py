@@ -13,7 +13,7 @@ import pytest
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.motors import Pose
 from tests import bounds
-from tests.camera.goals import Outcome, Rig, outcomes, random_goals, wanted, with_presets
+from tests.camera.goals import Outcome, Rig, outcomes, random_goals, wanted, wanted_cold, with_presets
 
 SEEDS = range(1, 6)
 BESIDE_DEG = 3.0
@@ -39,14 +39,14 @@ def test_no_motor_is_pushed_against_the_end_of_its_way(moved: tuple[str, list[Ou
 
 def test_the_motors_take_hardly_longer_than_they_must(moved: tuple[str, list[Outcome]]) -> None:
     name, found = moved
-    assert median(one.ratio for one in found) <= wanted(PROFILES[name])
+    assert median(one.ratio for one in found) <= wanted_cold(PROFILES[name])
 
 
 def test_a_goal_takes_few_commands(moved: tuple[str, list[Outcome]]) -> None:
     _, found = moved
     assert median(one.commands for one in found) <= bounds.COMMANDS - 2
     few = [one.commands <= bounds.COMMANDS for one in found]
-    assert sum(few) >= bounds.WITHIN_COMMANDS * len(few)
+    assert sum(few) >= bounds.COLD_WITHIN_COMMANDS * len(few)
 
 
 @pytest.mark.parametrize("name", sorted(PROFILES))
@@ -61,7 +61,7 @@ def test_a_calibrated_camera_takes_few_commands_from_its_first_goal_on(name: str
     assert max(one.commands for one in found) <= bounds.COMMANDS + bounds.CORRECTION
     few = [one.commands <= bounds.COMMANDS for one in found]
     assert sum(few) >= bounds.CALIBRATED_WITHIN_COMMANDS * len(few)
-    assert median(one.ratio for one in found) <= wanted(PROFILES[name], calibrated=True)
+    assert median(one.ratio for one in found) <= wanted(PROFILES[name])
 
 
 def test_no_first_goal_is_crept_to() -> None:
