@@ -36,7 +36,8 @@ def start(config: Config, post: Post) -> Iterator[CameraService]:
     view, address, gate = eye(config), config.address, Gate(config.login_retry_s)
     with ExitStack() as stack:  # what was opened last is closed first: nobody gives an order while the motors are ended
         channel = stack.enter_context(closing(Channel(config.name, config.stream, address, config.kind, post, gate)))
-        watchdog = stack.enter_context(closing(Watchdog(config.brand, address)))
+        lock = config.state and config.state / "cameras" / f"{config.name}.lock"
+        watchdog = stack.enter_context(closing(Watchdog(config.brand, address, lock)))
         device = Lanes(connector(config.brand, address, gate), post, turning=watchdog.tell, owing=gate.owe)
         made_sound = getattr(brand(config.brand), "sound", None)
         desk = Desk(device, made_sound(address, gate) if made_sound else None, post)

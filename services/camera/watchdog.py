@@ -1,11 +1,14 @@
 """A small process beside each camera service, and the probe, that stops the camera when those die in a motion.
 
 The service tells it through a pipe what turns. When the pipe closes, by an orderly end or by kill -9, and something
-still turned, it sends the stop. It ignores the signals that end the service: it has to outlive it by a second.
+still turned, it sends the stop. It ignores the signals that end the service: it has to outlive it by a second. As long
+as it lives it holds a lock, and the next service of that camera waits for that: the first motion of an order would be
+taken for one that the stop did not end.
 """
 
 from __future__ import annotations
 
+import fcntl
 import importlib
 import itertools
 import json
@@ -14,10 +17,11 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal, Protocol, cast
+from typing import IO, Any, Literal, Protocol, cast
 
 from pydantic import SecretStr
 
@@ -30,6 +34,7 @@ from services.errors import DeviceError
 STILL = "-"
 END_S = 0.5  # the service waits so long for the end of its watchdog, which may still have something to stop
 AGAIN_S = 0.5  # from its end to the beginning of another one
+OTHER_S, LOOK_S = 5.0, 0.05  # the next service waits so long for it, and looks so often whether it has ended
 STOP_S = 60.0  # the watchdog tries to stop a camera for so long
 COMMAND = "from services.camera.watchdog import main; main()"
 
@@ -37,9 +42,13 @@ log = logging.getLogger(__name__)
 
 
 class Watchdog:
-    """The service's end of the pipe. A watchdog that dies is followed by another one, which is told what turns."""
+    """The service's end of the pipe. A watchdog that dies is followed by another one, which is told what turns.
 
-    def __init__(self, brand: str, address: Address) -> None:
+    `lock`: a file that the camera's watchdogs lock; one of another service is waited for. None: there is no other.
+    """
+
+    def __init__(self, brand: str, address: Address, lock: Path | None = None) -> None:
+        self._lock = None if lock is None else _after_others(lock)
         self._address = json.dumps({"brand": brand, "address": _encode(address)})
         self._turns: str | None = None  # the last word; None: none was said yet
         self._changing = threading.Lock()
@@ -65,10 +74,13 @@ class Watchdog:
             self.process.wait(END_S)
         except subprocess.TimeoutExpired as error:
             log.warning("the watchdog is still at work: %s", error)
+        if self._lock is not None:
+            self._lock.close()
 
     def _begin(self) -> subprocess.Popen[str]:
+        shared = [] if self._lock is None else [self._lock.fileno()]
         process = subprocess.Popen(
-            [sys.executable, "-c", COMMAND], stdin=subprocess.PIPE, text=True, start_new_session=True
+            [sys.executable, "-c", COMMAND], stdin=subprocess.PIPE, text=True, start_new_session=True, pass_fds=shared
         )
         threading.Thread(target=self._follow, args=(process,), name="watchdog's end", daemon=True).start()
         self._write(process, self._address)
@@ -94,6 +106,26 @@ class Watchdog:
             process.stdin.flush()
         except OSError as error:
             log.error("the watchdog is gone, a crash would leave the camera turning: %s", error)
+
+
+def _after_others(file: Path) -> IO[bytes] | None:
+    """The file, locked until it is closed here and in every process that shares it; None where there cannot be one."""
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        held = file.open("ab")
+    except OSError as error:
+        log.warning("who else stops this camera is not known: %s", error)
+        return None
+    end = time.monotonic() + OTHER_S
+    while time.monotonic() < end:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(LOOK_S)
+        else:
+            return held
+    log.warning("the watchdog of another service of this camera is still at work")
+    return held
 
 
 class Connect(Protocol):
