@@ -294,6 +294,18 @@ def test_a_password_that_was_wrong_and_is_right_again_is_no_random_refusal_anoth
     assert camera.failed - failed == 3
 
 
+def test_an_account_that_was_locked_while_the_gate_was_shut_for_random_refusals_is_no_sign_of_more_of_them() -> None:
+    book = Book(good=True, odd_until=1.0)
+    for _ in range(3):
+        book.tries(urgent=True)
+        book.failed(0.0, sure=False)
+        book.back(urgent=True, answered=True)
+    assert isinstance(book.closed(0.0), Away)
+    book.close(0.0, "locked")
+    book.passed(book.tries(urgent=True), 5.0)
+    assert book.odd_until == 1.0
+
+
 def test_a_locked_account_is_told_and_later_asked_without_a_password() -> None:
     camera = Camera()
     visitors = Visitors(camera)

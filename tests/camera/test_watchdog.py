@@ -14,6 +14,7 @@ from services.camera.address import Address
 from services.camera.device import Direction
 from services.camera.watchdog import Watchdog
 from services.peers import free_port
+from tests.small_flat import words_of
 
 
 def nobody() -> Address:
@@ -32,10 +33,7 @@ def orphan(lock: Path) -> Watchdog:
 
 def alive(one: Watchdog) -> bool:
     """Whether its process runs."""
-    try:
-        return Path(f"/proc/{one.process.pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    return any(words_of(Path(f"/proc/{one.process.pid}")))
 
 
 def test_the_next_one_waits_until_the_one_before_has_ended(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ class Book:
     def passed(self, number: int, now: float) -> None:
         """A login was accepted; it says nothing about those that failed after it was sent."""
         if number == self.ever:
-            if self.odd and not self.closings:
+            if self.odd and self.why in ("", "odd"):
                 self.odd_until = now + ODD_WINDOW_S
             self.odd, self.good = False, True
             self.failures, self.closings, self.why, self.opens_at = 0, 0, "", None
