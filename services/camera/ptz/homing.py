@@ -70,7 +70,8 @@ class Homing:
                 continue
             speed = ladder.next(self._left(side, now), speed, helm.left - LOOK)
             if speed < 0:
-                ladder, side, speed = ladder.back, -side, -speed
+                knows = ladder.back is not ladder  # how much room there is on its way back
+                ladder, side, speed = (ladder.back, -side, -speed) if knows else self._set_out(now)
         return now
 
     def _set_out(self, now: float) -> tuple[Ladder, int, int]:

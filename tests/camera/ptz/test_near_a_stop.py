@@ -55,6 +55,13 @@ def test_a_look_and_what_follows_it_may_both_come_late(tilt: int) -> None:
         assert outcome.pushed == 0.0
 
 
+def test_what_turned_back_twice_has_no_more_room_than_before() -> None:
+    """Tilt comes back to a goal a degree before its stop; its next speed is one that may end late there, too."""
+    rig = Rig(PROFILES["dahua-pan-only"], 150, network_s=0.004)
+    rig.calibrate()
+    assert sum(outcome.pushed for outcome in rig.visit(random_goals(36, 150))) == 0.0
+
+
 def test_nothing_turns_for_long_without_a_look_when_one_axis_has_ended_before_the_other() -> None:
     rig = Rig(PROFILE, 413)
     seen: list[Reply] = []
