@@ -18,7 +18,6 @@ from services.camera.ptz.stand import stop as until_confirmed
 from services.errors import DeviceError
 
 NEAR_LEVELS = 0.5
-END_LEVELS = 0.3  # zoom ends so far from the ends of its range
 ODD_DEG = 0.4  # a reading farther from what was reckoned may not be of a camera at rest
 STRAY_DEG = 2.0  # a reading farther from that, of a camera that says it moves, is none of the last bit of its way
 LATE_DOUBT_S = 0.15  # with more doubt about the age of readings, two equal ones
@@ -265,19 +264,14 @@ class Helm:
             off = min(high - UNSURE_LEVELS, max(low + UNSURE_LEVELS, reckoned)) - reading.zoom
             self.skill.zoomed = (reading.zoom, reading.zoom + (off if abs(off) <= half else sign(off) * half / 2))
 
-    def zoom_aim(self) -> float:
-        """Where zoom should end: a late end does no harm there, and its coarse reading is the goal's."""
-        low, high = self.limits.zoom
-        return min(high - END_LEVELS, max(low + END_LEVELS, self.goal.pose[ZOOM]))
-
     @property
     def zoom_near(self) -> float:
         """As near as that zoom has arrived: its coarse reading is the goal's then."""
         return max(NEAR_LEVELS, self.skill.zoom_grid / 2)
 
     def time_zoom(self, now: float) -> None:
-        """When zoom has to be ended, by what is known of its rate."""
-        self.zoom_ends = max(now, self.course.end_for(ZOOM, self.zoom_aim(), now) - self.skill.timing.usual)
+        """When zoom has to be ended, by what is known of its rate; a late end does no harm at the end of its range."""
+        self.zoom_ends = max(now, self.course.end_for(ZOOM, self.goal.pose[ZOOM], now) - self.skill.timing.usual)
 
 
 def levels_of(turning: dict[int, int]) -> Levels:

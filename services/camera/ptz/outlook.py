@@ -29,7 +29,7 @@ OVER_S = 4.0  # what it is worth to need a command less, where there are too few
 MOST_OVER = 6  # what needs more commands than that beyond those that there are is not thought through
 NEVER_S = 30.0
 FEW = 8  # commands: with no more left than that, each is worth more, so
-RUNG_S = 1.1  # an end that comes early, for a slower leg to go on, has to save so much
+RUNG_S = 2.0  # an end that comes early, for a slower leg to go on, has to save so much
 FINE = 6.0  # steps of distance in each factor of e
 
 

@@ -25,8 +25,8 @@ AGAIN = 3  # ends without a look, at most
 def widest(limits: Limits, skill: Skill, now: float) -> Plan[float]:
     """Makes sure that zoom is at its very widest, where a place in the picture can be reckoned; mostly it is.
 
-    A move leaves it a little before the end, where its coarse reading says the same. A digital zoom has no end stop to
-    be pushed against, so it is held there a moment longer than it needs.
+    A move may leave it a little before the end, where its coarse reading says the same. A digital zoom has no end stop
+    to be pushed against, so it is held there a moment longer than it needs.
     """
     low = limits.zoom[0]
     if skill.zoomed is None or skill.zoomed[1] <= low + WIDE_LEVELS:
@@ -46,7 +46,7 @@ class Zooming:
 
     def _way(self) -> float:
         """How far zoom has to go, with its sign."""
-        return self.helm.zoom_aim() - self.helm.course.rests(ZOOM)
+        return self.helm.goal.pose[ZOOM] - self.helm.course.rests(ZOOM)
 
     def settle(self, now: float) -> Plan[float]:
         """Ends zoom where that is due before a look; where it surely missed it turns again."""
