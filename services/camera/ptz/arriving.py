@@ -89,14 +89,18 @@ class Arriving:
     def _last(self) -> Reading:
         """The reading of the rest: where one tells of a moment before that, it surely goes on to its end.
 
-        Whether it moves there nobody has told.
+        So it does where that end is beside the goal, and the reading just before it. Whether it moves there nobody has
+        told.
         """
         seen = self.seen[-1]
-        if self.when >= self.arrives or self._rests or not self._there:
+        if self._rests or not self._there:
+            return seen
+        passes = (self.helm.out(self.to) - self.helm.out(self.helm.limits.pose(seen))) & set(self._axes)
+        if self.when >= self.arrives and not self._moves and not passes:
             return seen
         if not self._zoomed:
             seen = zoom_drive.at_end(self.helm.skill, self.zooming, seen)
-        if self.off <= THERE_DEG:
+        if self.off <= THERE_DEG and not passes:
             return seen
         tilt = seen.tilt if self.ended else round(self.to[TILT], 2)
         return replace(seen, pan=round(self.to[PAN] % 360.0, 2), tilt=tilt, moving=None)
@@ -155,12 +159,16 @@ class Arriving:
         return abs(off) <= NEARER_DEG + MOMENT_S * abs(speed)
 
     @property
+    def _moves(self) -> bool:
+        """Whether it says that it moves, and does not say so at rest, too."""
+        return self.seen[-1].moving is True and not self.helm.skill.always_moving
+
+    @property
     def _goes_there(self) -> bool:
         """Whether what may still turn surely ends there."""
-        skill, moving = self.helm.skill, self.seen[-1].moving
-        longer = self.hops or self.when > self.arrives + RESTED_S
-        goes_on = longer and moving is True and not skill.always_moving
-        ends = skill.tells_rest(moving) or zoom_drive.sure(skill, self.zooming, self.now)
+        skill = self.helm.skill
+        goes_on = self._moves and (self.hops or self.when > self.arrives + RESTED_S)
+        ends = skill.tells_rest(self.seen[-1].moving) or zoom_drive.sure(skill, self.zooming, self.now)
         return not self.about and not goes_on and ends
 
     @property

@@ -72,7 +72,11 @@ class Helm:
 
     def beside(self, pose: Pose) -> bool:
         """Whether this is not the goal yet."""
-        return any(abs(self.goal.pose[axis] - pose[axis]) > self.near for axis in (PAN, TILT))
+        return bool(self.out(pose))
+
+    def out(self, pose: Pose) -> set[int]:
+        """Which of pan and tilt are not where they should be."""
+        return {axis for axis in (PAN, TILT) if abs(self.goal.pose[axis] - pose[axis]) > self.near}
 
     def stand(self, reading: Reading) -> None:
         """It was read at rest."""
