@@ -9,13 +9,14 @@ from __future__ import annotations
 GOALS = 50  # at random in pan, tilt and zoom, on both sides of the dead arc, one after the other
 OFF_DEG = 0.5  # the truth, when `done` is said
 MEDIAN_START_STOP = 2.0  # time over the least time of the motors, where the camera takes only start and stop
-MEDIAN_POSITIONS = 1.3  # where it honours a position, absolute or relative, or the goal is a place that has a preset
+MEDIAN_POSITIONS = 1.3  # where it honours a position, absolute or relative, or a preset is within NEAR_DEG of the goal
 COLD_MEDIAN_RELATIVE = 1.42  # not 1.3 where only one within the picture is
-MEDIAN_BESIDE = 2.0  # of start and stop from a preset that is up to PRESET_DEG beside the goal
-PRESET_DEG = 2.0
+NEAR_DEG = 0.35  # in pan and in tilt: a preset so near is the end of a move, whatever its readings do
+MEDIAN_BESIDE = 2.0  # of start and stop from a preset that is up to BESIDE_DEG beside the goal: a leg follows
+BESIDE_DEG = 2.0
 COMMANDS = 12  # for a goal, answers to login challenges not counted
-CORRECTION = 3  # more at the very most where a camera is calibrated: one more leg, and a reading
-CALIBRATED_WITHIN_COMMANDS = 0.995  # of the goals of a calibrated camera; two late answers in one move may cost more
+CORRECTION = 3  # more at the very most of many times GOALS: two late answers in one move may cost one more leg
+CALIBRATED_WITHIN_COMMANDS = 0.995  # of those
 COLD_WITHIN_COMMANDS = 0.95  # of the goals at least; a first goal, or one with a late answer or two, takes more
 
 SCAN_OVER_LEAST = 1.3  # a full scan (both picture modes, K = 8) over the least time of motors, frames and one switch

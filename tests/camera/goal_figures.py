@@ -114,11 +114,22 @@ def bound_by_hops(goals: list[tuple[float, float, float]]) -> Row:
 
 
 def _presets(goals: list[tuple[float, float, float]]) -> list[Row]:
-    """Where a preset is at the goal, and where one lies beside it."""
-    beside = {0.25: bounds.MEDIAN_POSITIONS, bounds.PRESET_DEG: bounds.MEDIAN_BESIDE}
+    """Where a preset is near the goal, on every firmware, and where one lies beside it."""
+    near, beside = bounds.NEAR_DEG, bounds.BESIDE_DEG
     return [
-        _row(f"{COMPARED}, preset within {far:g} deg", with_presets(PROFILES[COMPARED], goals, SEED, far), bound)
-        for far, bound in beside.items()
+        *(
+            _row(
+                f"{name}, calibrated, preset within {near:g} deg",
+                with_presets(profile, goals, SEED, near, calibrated=True),
+                bounds.MEDIAN_POSITIONS,
+            )
+            for name, profile in PROFILES.items()
+        ),
+        _row(
+            f"{COMPARED}, preset within {beside:g} deg",
+            with_presets(PROFILES[COMPARED], goals, SEED, beside),
+            bounds.MEDIAN_BESIDE,
+        ),
     ]
 
 

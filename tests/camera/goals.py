@@ -237,9 +237,13 @@ def outcomes(
     return rig.visit(goals)
 
 
-def with_presets(profile: Profile, goals: Iterable[Goal], seed: int, beside: float) -> list[Outcome]:
+def with_presets(
+    profile: Profile, goals: Iterable[Goal], seed: int, beside: float, *, calibrated: bool = False
+) -> list[Outcome]:
     """The same where each goal has a preset near it, known from a place, and never gone to before."""
     rig, found, rng = Rig(profile, seed), [], random.Random(seed)
+    if calibrated:
+        rig.calibrate()
     for goal in goals:
         low, high = (187.0, 359.9) if goal[0] > 180.0 else (0.0, 178.5)
         pan = min(high, max(low, goal[0] + rng.uniform(-beside, beside)))

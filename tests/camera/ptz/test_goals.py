@@ -49,19 +49,32 @@ def test_a_goal_takes_few_commands(moved: tuple[str, list[Outcome]]) -> None:
     assert sum(few) >= bounds.COLD_WITHIN_COMMANDS * len(few)
 
 
-@pytest.mark.parametrize("name", sorted(PROFILES))
-def test_a_calibrated_camera_takes_few_commands_from_its_first_goal_on(name: str) -> None:
-    found = [
-        one
-        for seed in SEEDS
-        for one in outcomes(PROFILES[name], random_goals(bounds.GOALS, seed), seed, calibrated=True)
-    ]
+@pytest.fixture(scope="module", params=sorted(PROFILES))
+def calibrated(request: pytest.FixtureRequest) -> tuple[str, list[list[Outcome]]]:
+    """Of each seed the goals, in cameras that were calibrated."""
+    profile = PROFILES[request.param]
+    return request.param, [outcomes(profile, random_goals(bounds.GOALS, seed), seed, calibrated=True) for seed in SEEDS]
+
+
+def test_fifty_goals_of_a_calibrated_camera_are_within_every_bound(calibrated: tuple[str, list[list[Outcome]]]) -> None:
+    """The table that `make bench` prints."""
+    name, (found, *_) = calibrated
     assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
-    assert max(one.commands for one in found[:: bounds.GOALS]) <= bounds.COMMANDS  # the first ones
+    assert max(one.commands for one in found) <= bounds.COMMANDS
+    assert median(one.ratio for one in found) <= wanted(PROFILES[name])
+
+
+def test_a_calibrated_camera_takes_few_commands_from_its_first_goal_on(
+    calibrated: tuple[str, list[list[Outcome]]],
+) -> None:
+    name, tables = calibrated
+    found = [one for table in tables for one in table]
+    assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
+    assert max(table[0].commands for table in tables) <= bounds.COMMANDS
     assert max(one.commands for one in found) <= bounds.COMMANDS + bounds.CORRECTION
     few = [one.commands <= bounds.COMMANDS for one in found]
     assert sum(few) >= bounds.CALIBRATED_WITHIN_COMMANDS * len(few)
-    assert median(one.ratio for one in found) <= wanted(PROFILES[name])
+    assert max(median(one.ratio for one in table) for table in tables) <= wanted(PROFILES[name])
 
 
 def test_no_first_goal_is_crept_to() -> None:
@@ -86,17 +99,40 @@ def test_where_beside_the_goal_will_do_it_is_met_with_fewer_commands_and_sooner(
 WITHOUT_POSITIONS = ("ip3m-941w-2019", "ip2m-841b-strict", "dahua-pan-only")
 
 
+@pytest.mark.parametrize("name", sorted(PROFILES))
+def test_where_a_preset_is_near_the_goal_its_move_is_all_it_takes(name: str) -> None:
+    found = [
+        one
+        for seed in SEEDS
+        for one in with_presets(
+            PROFILES[name], random_goals(bounds.GOALS, seed), seed, bounds.NEAR_DEG, calibrated=True
+        )
+    ]
+    assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
+    assert max(one.commands for one in found) <= bounds.COMMANDS
+    assert median(one.ratio for one in found) <= bounds.MEDIAN_POSITIONS
+
+
 @pytest.mark.parametrize("name", WITHOUT_POSITIONS)
-@pytest.mark.parametrize(
-    ("beside", "bound"), [(0.25, bounds.MEDIAN_POSITIONS), (bounds.PRESET_DEG, bounds.MEDIAN_BESIDE)]
-)
-def test_a_preset_at_the_goal_or_beside_it_saves_time(name: str, beside: float, bound: float) -> None:
+def test_a_preset_beside_the_goal_saves_time(name: str) -> None:
     """From beside it a start, its end, and a reading at rest follow: three answers of 0.3 s."""
+    found = [
+        one
+        for seed in SEEDS
+        for one in with_presets(PROFILES[name], random_goals(bounds.GOALS, seed), seed, bounds.BESIDE_DEG)
+    ]
+    assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
+    assert median(one.ratio for one in found) <= bounds.MEDIAN_BESIDE
+
+
+@pytest.mark.parametrize("name", ["dahua-pan-only", "ip2m-841b-strict", "ip3m-941w-2016", "ip4m-1051b-2019"])
+@pytest.mark.parametrize("beside", [0.6, 1.0])
+def test_a_preset_just_beside_the_goal_is_not_taken_for_the_goal(name: str, beside: float) -> None:
+    """On its last bit of way there the camera passes the goal, and a look may tell of that moment."""
     found = [
         one for seed in SEEDS for one in with_presets(PROFILES[name], random_goals(bounds.GOALS, seed), seed, beside)
     ]
-    assert [one for one in found if one.error or one.off > bounds.OFF_DEG or one.pushed or not one.rests] == []
-    assert median(one.ratio for one in found) <= bound
+    assert [one for one in found if one.off > bounds.OFF_DEG or one.error or not one.rests] == []
 
 
 @pytest.mark.parametrize("name", WITHOUT_POSITIONS)
