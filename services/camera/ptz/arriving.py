@@ -185,12 +185,18 @@ class Arriving:
 
     @property
     def _rested(self) -> float:
-        """When all rests, at the latest, that was seen slowing down on its last bit of way."""
+        """When all rests, at the latest, that was seen on its last bit of way."""
         skill, left = self.helm.skill, READ_DEG + self.off
         newer = min(NEWEST_S, NEWER * skill.paces[PAN].other_doubt(READ_LATE))
-        slowest = max(_last(pace, left) for axis in (PAN, TILT) for pace in (skill.drive(axis), skill.paces[axis]))
-        turns = min(self.when + newer, self.now) + LONGER * slowest
+        slows = max(_last(pace, left) for axis in (PAN, TILT) for pace in (skill.drive(axis), skill.paces[axis]))
+        turns = min(self.when + newer, self.now) + LONGER * max(slows, self._before_it_slows)
         return max(zoom_drive.rests(skill, self.zooming), turns)
+
+    @property
+    def _before_it_slows(self) -> float:
+        """How long pan and tilt take to their rest that were seen before they slow down; 0 where they do by now."""
+        ways = [self.turning[axis] for axis in self._axes] if self.turning else []
+        return max((way.ends - self.when for way in ways if self.when < way.brakes), default=0.0)
 
 
 def _last(pace: Pace, left: float) -> float:

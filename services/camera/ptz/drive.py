@@ -181,6 +181,11 @@ def pan_only(skill: Skill) -> bool:
     return "pan" in skill.honours.values() and "yes" not in skill.honours.values()
 
 
+def forget_pan_only(skill: Skill) -> None:
+    """A position led tilt after all, so where it once stayed it only was where that led: positions are tried anew."""
+    skill.honours = {form: honours for form, honours in skill.honours.items() if honours != "pan"}
+
+
 def to_pan(here: Pose, to: Pose) -> MoveTo:
     """To a pan and a zoom, on such firmware."""
     return MoveTo(to[PAN] % 360.0, round(here[TILT], 1), to[ZOOM], "PositionABS")

@@ -24,6 +24,7 @@ ALONG = 1.0
 BACK_DEG = 10.0  # it goes no farther behind its goal
 LOOK = 1  # command, at the end
 RETURNS = 2.5  # of the time to slow down: tilt may return to where it was when it was ended
+LED_DEG, DOUBTS = 1.0, 2.0  # farther from where it was ended tilt was not, but led by the position
 MOST_STEPS = 20  # hardly ever more than eight; then it is ended where it is
 
 Watch = Callable[[Leg, dict[int, int], float], Plan[float]]
@@ -91,13 +92,15 @@ class Homing:
         acted, course = begun.received, helm.course
         turns, tilts = (helm.skill.paces[axis].velocity(course.told[axis], acted) for axis in (PAN, TILT))
         ended = acted + RETURNS * helm.skill.paces[TILT].slow * abs(tilts)
-        tilt = course.stopped(TILT, acted)
+        tilt, unsure = course.stopped(TILT, acted), course.doubt(TILT, acted)
         here, speeds = (course.at(PAN, acted), tilt, zoom), (turns, 0.0, 0.0)
         course.leave(here)
         helm.zoom_ends = None
         to = (helm.aim[PAN], tilt, helm.goal.pose[ZOOM])
         drive = own.Begun(own.Drive(request, to), here, begun, speeds, ended)
         reading, now, _ = yield from follow(helm, drive, certain=True, proven=True)
+        if abs(reading.tilt - tilt) > LED_DEG + DOUBTS * unsure:
+            own.forget_pan_only(helm.skill)
         return reading, now
 
     def _way(self, axis: int, now: float) -> Way:

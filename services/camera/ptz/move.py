@@ -22,7 +22,7 @@ from services.camera.ptz.helm import PROMISED, Helm
 from services.camera.ptz.homing import Homing
 from services.camera.ptz.hopping import Hopping
 from services.camera.ptz.outlook import LEG
-from services.camera.ptz.skill import DITHER_DEG, Skill
+from services.camera.ptz.skill import DITHER_DEG, THERE_DEG, Skill
 from services.camera.ptz.stand import settle
 from services.camera.ptz.turning import Turning
 from services.camera.ptz.zooming import Zooming
@@ -121,12 +121,21 @@ class Move:
             self.helm.commands += 2
         else:
             reading, now = near, (yield from wait(0.0))
-            here, foretold = self.helm.limits.pose(near), self.helm.skill.foretold
-            if foretold is not None and near.moving is not None:
+            if near.moving is None and self._hardly_there(near):
+                reply = yield from self.helm.send(Status())
+                reading, now = cast(Reading, reply.result), reply.received
+            here, foretold = self.helm.limits.pose(reading), self.helm.skill.foretold
+            if foretold is not None and reading.moving is not None:
                 self.helm.skill.ended(max(abs(here[axis] - foretold[axis]) for axis in (PAN, TILT)))
-            self.helm.foretold = near.moving is None
+            self.helm.foretold = reading.moving is None
         self.helm.stand(reading)
         return reading, now
+
+    def _hardly_there(self, reading: Reading) -> bool:
+        """Whether it would be there already, but for what a rest that was foretold may be off."""
+        pose = self.helm.limits.pose(reading)
+        off = max(abs(self.helm.goal.pose[axis] - pose[axis]) for axis in (PAN, TILT))
+        return self.helm.near - THERE_DEG < off <= self.helm.near
 
     def _out(self, reading: Reading) -> list[int]:
         """The axes that are not where they should be; zoom only while it does not turn.
