@@ -96,7 +96,7 @@ class Arriving:
         if self._rests or not self._there:
             return seen
         passes = (self.helm.out(self.to) - self.helm.out(self.helm.limits.pose(seen))) & set(self._axes)
-        if self.when >= self.arrives and not self._moves and not passes:
+        if self.when >= self.arrives and not passes and not self.helm.skill.tells_motion(seen.moving):
             return seen
         if not self._zoomed:
             seen = zoom_drive.at_end(self.helm.skill, self.zooming, seen)
@@ -159,16 +159,11 @@ class Arriving:
         return abs(off) <= NEARER_DEG + MOMENT_S * abs(speed)
 
     @property
-    def _moves(self) -> bool:
-        """Whether it says that it moves, and does not say so at rest, too."""
-        return self.seen[-1].moving is True and not self.helm.skill.always_moving
-
-    @property
     def _goes_there(self) -> bool:
         """Whether what may still turn surely ends there."""
-        skill = self.helm.skill
-        goes_on = self._moves and (self.hops or self.when > self.arrives + RESTED_S)
-        ends = skill.tells_rest(self.seen[-1].moving) or zoom_drive.sure(skill, self.zooming, self.now)
+        skill, moving = self.helm.skill, self.seen[-1].moving
+        goes_on = skill.tells_motion(moving) and (self.hops or self.when > self.arrives + RESTED_S)
+        ends = skill.tells_rest(moving) or zoom_drive.sure(skill, self.zooming, self.now)
         return not self.about and not goes_on and ends
 
     @property

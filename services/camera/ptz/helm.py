@@ -157,7 +157,7 @@ class Helm:
     def _resting(self, reply: Reply, seen: Reading) -> Reading | None:
         """The reading of the rest that follows from one of the last bit of way, or is one; None: it may be neither."""
         pace, late = self.skill.paces[PAN], self.skill.timing.late(reply)
-        when, moves = pace.seen_at(reply.sent, late), self._moves(seen) and self.zoom_ends is None
+        when, moves = pace.seen_at(reply.sent, late), self.skill.tells_motion(seen.moving) and self.zoom_ends is None
         slack = self._unsure(late)
         if seen.moving is False or any(self.course.levels[:2]) or when > self.course.rests_at() + slack:
             return None if moves else seen
@@ -217,7 +217,7 @@ class Helm:
 
     def _runs_on(self, seen: Reading) -> bool:
         """Whether it says that it moves, and is far from where it should rest: the stop may have had no effect."""
-        return self._moves(seen) and self.zoom_ends is None and self._off(seen) > STRAY_DEG
+        return self.skill.tells_motion(seen.moving) and self.zoom_ends is None and self._off(seen) > STRAY_DEG
 
     def _late_doubted(self) -> bool:
         """Whether the age of readings is not known well."""
@@ -231,10 +231,6 @@ class Helm:
         """How far a reading is from where it should rest, degrees."""
         pose, turned = self.limits.pose(reading), [axis for axis in (PAN, TILT) if self.course.told[axis]]
         return max((abs(pose[axis] - self.course.stopped(axis, FOREVER)) for axis in turned), default=0.0)
-
-    def _moves(self, reading: Reading) -> bool:
-        """Whether the camera says that it moves; some firmware says so for ever."""
-        return reading.moving is True and not self.skill.always_moving
 
     def _unsure(self, late: float) -> float:
         """How far off it may be when it rests, over the moment that a look so late tells of, seconds."""

@@ -204,7 +204,7 @@ def ends(skill: Skill, glides: Sequence[Glide], known: Sequence[Doubts], reply: 
     if skill.tells_rest(moving) and over >= 0.0:
         return [read(pose[axis], known[axis]) for axis in (PAN, TILT)]
     told = [foretell(glides[axis], seen, pose[axis], known[axis]) for axis in (PAN, TILT)]
-    odd = skill.tells_rest(moving) or (moving is True and not skill.always_moving and over > RESTED_S)
+    odd = skill.tells_rest(moving) or (skill.tells_motion(moving) and over > RESTED_S)
     return [replace(end, odd=end.odd or odd) for end in told]
 
 

@@ -218,6 +218,10 @@ class Skill:
         """Whether what the camera says of its motion tells by itself that it rests: its word was seen to change."""
         return moving is False and self.says_moving and not self.always_moving
 
+    def tells_motion(self, moving: bool | None) -> bool:
+        """Whether it says that it moves, and does not say so at rest, too."""
+        return moving is True and not self.always_moving
+
     def tells_end(self, moving: bool | None) -> bool:
         """Whether it tells that the position beside it is the last one: what it says may be newer than that."""
         return self.says_late and self.tells_rest(moving)
