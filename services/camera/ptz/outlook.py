@@ -12,7 +12,7 @@ from functools import cached_property
 from math import exp, inf, log, sqrt
 from typing import NamedTuple
 
-from services.camera.ptz.pace import Pace, Rates
+from services.camera.ptz.pace import STOP_LATE, Pace
 from services.camera.ptz.skill import DITHER_DEG, Skill
 
 NOISE_DEG = 0.05  # of a reading, beside what is learnt
@@ -31,6 +31,27 @@ NEVER_S = 30.0
 FEW = 8  # commands: with no more left than that, each is worth more, so
 RUNG_S = 2.0  # an end that comes early, for a slower leg to go on, has to save so much
 FINE = 6.0  # steps of distance in each factor of e
+
+
+class Rates:
+    """What is known of an axis at one moment, as its `Pace` tells it: for who asks for it thousands of times."""
+
+    def __init__(self, pace: Pace) -> None:
+        self.speeds, self.slow, self.stop_late = pace.speeds, pace.slow, pace.other(STOP_LATE)
+        self._rates, self._doubts = ([ask(speed) for speed in pace.speeds] for ask in (pace.rate, pace.doubt))
+        self._known = [pace.known(speed) for speed in pace.speeds]
+
+    def rate(self, speed: int) -> float:
+        """Degrees per second, positive."""
+        return self._rates[speed - 1]
+
+    def doubt(self, speed: int) -> float:
+        """The standard deviation of a rate."""
+        return self._doubts[speed - 1]
+
+    def known(self, speed: int) -> bool:
+        """Whether a rate is known well enough to time a stop by it."""
+        return self._known[speed - 1]
 
 
 @dataclass(frozen=True)

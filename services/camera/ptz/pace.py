@@ -36,6 +36,8 @@ DRIFT = 0.002  # of each rate, per motion: motors age
 DOUBT_AGAIN = 0.01  # of the first guess's covariance, when what is known was wrong
 AGAIN_DEG = 0.5  # no reading is so far off: an axis that rests there has come another way than was known
 ROUNDS = 3  # of learning from one reading: a speed that is reached late bends what it shows
+UNSURE = 0.2  # of a rate, from which doubt on what a reading tells of it is looked for in two places
+HALVINGS = 20
 OUTLIER = 3.0  # standard deviations; beyond, a reading counts for less
 
 
@@ -58,6 +60,14 @@ class Seen(NamedTuple):
 
 
 Vector = NDArray[np.float64]
+
+
+class _Fit(NamedTuple):
+    """Numbers that fit a reading, their covariance, and how unlikely they are, in squares of standard deviations."""
+
+    unlikely: float
+    mean: Vector
+    cov: Vector
 
 
 def _prior(guess: Sequence[float]) -> tuple[Vector, Vector]:
@@ -137,31 +147,49 @@ class Pace:
 
     def expected(self, told: Sequence[Told], seen: Seen) -> tuple[float, float]:
         """What a reading should show, and the doubt about that."""
-        value, slope = self._slope(told, seen)
+        value, slope = self._slope(told, seen, self.mean)
         return value, float(np.sqrt(slope @ self.cov @ slope))
 
     def apart(self, told: Sequence[Told], one: Seen, other: Seen) -> float:
         """The doubt about how far it goes from one moment to another."""
-        slope = self._slope(told, other)[1] - self._slope(told, one)[1]
+        slope = self._slope(told, other, self.mean)[1] - self._slope(told, one, self.mean)[1]
         return float(np.sqrt(slope @ self.cov @ slope))
 
     def learn(self, told: Sequence[Told], seen: Seen) -> None:
         """Takes in one reading. It may be of another time than is thought, but not where the axis rests: if it rests
         far from where it should, then what was thought to be known well is not.
         """
-        expected, slope = self._slope(told, seen)
+        expected, slope = self._slope(told, seen, self.mean)
         wrong = seen.travel - expected
         likely = float(slope @ self.cov @ slope) + seen.noise**2
         if wrong * wrong > max(AGAIN_DEG**2, OUTLIER**2 * likely) and not self.velocity(
             told, self.seen_at(seen.at, seen.late)
         ):
             self.cov = self.cov + DOUBT_AGAIN * _prior(self.guess)[1]
-        before, cov = self.mean, self.cov
+        fit, used = self._fitted(told, seen, self.mean), {abs(one.level) for one in told if one.level}
+        if any(self.doubt(speed) > UNSURE * self.rate(speed) for speed in used):
+            fit = min(fit, self._fitted(told, seen, self._as_fast(told, seen)), key=lambda one: one.unlikely)
+        self.mean, self.cov = fit.mean, fit.cov
+
+    def _fitted(self, told: Sequence[Told], seen: Seen, mean: Vector) -> _Fit:
+        """What fits a reading, looked for from some numbers on: where little is known, more than one thing may."""
         for _ in range(ROUNDS):  # the iterated extended Kalman filter: the slope is that where this leads
-            expected, slope = self._slope(told, seen)
-            wrong = seen.travel - expected - float(slope @ (before - self.mean))
-            self.mean, self.cov = taught(before, cov, slope, wrong, seen.noise)
-            self._keep_within()
+            expected, slope = self._slope(told, seen, mean)
+            wrong = seen.travel - expected - float(slope @ (self.mean - mean))
+            mean, cov = taught(self.mean, self.cov, slope, wrong, seen.noise)
+            mean = self._within(mean)
+        off, changed = (seen.travel - self._shown(mean, told, seen)) / seen.noise, mean - self.mean
+        return _Fit(off**2 + float(changed @ np.linalg.lstsq(self.cov, changed)[0]), mean, cov)
+
+    def _as_fast(self, told: Sequence[Told], seen: Seen) -> Vector:
+        """The numbers with other rates of the speeds that it was told: those with which it would have come so far."""
+        used, low, high = sorted({abs(one.level) - 1 for one in told if one.level}), FLOOR, 1 / FLOOR
+        for _ in range(HALVINGS):
+            mean, part = self.mean.copy(), (low * high) ** 0.5
+            mean[used] *= part
+            farther = abs(self._shown(mean, told, seen)) > abs(seen.travel)
+            low, high = (low, part) if farther else (part, high)
+        return mean
 
     def measure_late_from(self, later: float) -> None:
         """What is usual for an answer is so many seconds more now; readings and commands mean the same as before."""
@@ -189,7 +217,7 @@ class Pace:
         part = np.linalg.solve(known, self.cov[own, :]).T
         self.mean = self.mean + part @ (other.mean[others] - self.mean[own])
         self.cov = self.cov + part @ (better - known) @ part.T
-        self._keep_within()
+        self.mean = self._within(self.mean)
 
     def suppose(self, rate: float, part: float, half_change: float) -> None:
         """Its one rate is known from elsewhere but for such a share, and how fast it changes speed, too."""
@@ -202,7 +230,7 @@ class Pace:
         slopes = np.zeros_like(self.mean)
         slopes[speed - 1] = slope
         self.mean, self.cov = taught(self.mean, self.cov, slopes, wrong, noise)
-        self._keep_within()
+        self.mean = self._within(self.mean)
 
     def age(self) -> None:
         """A motion is over: motors and networks change, so nothing stays known for ever."""
@@ -212,20 +240,20 @@ class Pace:
         rest = np.arange(count, count + 5)
         self.cov[rest, rest] += np.square(0.01 * np.array(DOUBT))
 
-    def _keep_within(self) -> None:
+    def _within(self, mean: Vector) -> Vector:
         count = len(self.guess)
-        self.mean[:count] = np.maximum(self.mean[:count], FLOOR * np.array(self.guess))
-        self.mean[count:] = np.clip(self.mean[count:], LEAST, MOST)
+        rates = np.maximum(mean[:count], FLOOR * np.array(self.guess))
+        return np.concatenate([rates, np.clip(mean[count:], LEAST, MOST)])
 
-    def _slope(self, told: Sequence[Told], seen: Seen) -> tuple[float, Vector]:
+    def _slope(self, told: Sequence[Told], seen: Seen, mean: Vector) -> tuple[float, Vector]:
         """What a reading should show, and how that changes with each number."""
         count = len(self.guess)
         used = {abs(one.level) - 1 for one in told if one.level}
         slope = np.zeros(count + 5)
-        value = self._shown(self.mean, told, seen)
+        value = self._shown(mean, told, seen)
         for number in (*used, *range(count, count + 5)):
-            step = max(1e-4, 1e-3 * abs(self.mean[number]))
-            moved = self.mean.copy()
+            step = max(1e-4, 1e-3 * abs(mean[number]))
+            moved = mean.copy()
             moved[number] += step
             slope[number] = (self._shown(moved, told, seen) - value) / step
         return value, slope
@@ -236,27 +264,6 @@ class Pace:
         if seen.acts:
             at = seen.at - float(mean[count + ACT_PART]) * seen.late
         return _travel(mean, count, told, at)[0]
-
-
-class Rates:
-    """What is known of an axis at one moment, as its `Pace` tells it: for who asks for it thousands of times."""
-
-    def __init__(self, pace: Pace) -> None:
-        self.speeds, self.slow, self.stop_late = pace.speeds, pace.slow, pace.other(STOP_LATE)
-        self._rates, self._doubts = ([ask(speed) for speed in pace.speeds] for ask in (pace.rate, pace.doubt))
-        self._known = [pace.known(speed) for speed in pace.speeds]
-
-    def rate(self, speed: int) -> float:
-        """Degrees per second, positive."""
-        return self._rates[speed - 1]
-
-    def doubt(self, speed: int) -> float:
-        """The standard deviation of a rate."""
-        return self._doubts[speed - 1]
-
-    def known(self, speed: int) -> bool:
-        """Whether a rate is known well enough to time a stop by it."""
-        return self._known[speed - 1]
 
 
 def taught(mean: Vector, cov: Vector, slope: Vector, wrong: float, noise: float) -> tuple[Vector, Vector]:

@@ -70,6 +70,17 @@ def test_a_reading_on_the_way_tells_where_it_is_however_little_was_known_of_the_
     assert course.doubt(PAN, 1015.0) == 0.0
 
 
+@pytest.mark.parametrize("rate", [5.0, 9.5, 20.0, 45.0, 70.0])
+def test_what_comes_less_far_than_was_thought_is_slow_and_does_not_only_take_long_to_be_fast(rate: float) -> None:
+    pace, half = Pace(PAN_RATES), 1 / (2 * 120.0)
+    for level, speed, looks in ((1, rate / 15, (1.5, 6.0)), (8, rate, (0.6, 1.1))):
+        for seconds in looks:
+            travel = speed * seconds - half * speed * speed
+            pace.learn([Told(1000.0, 0.0, level)], Seen(1000.0 + seconds, 0.0, travel, 0.1))
+        pace.age()
+    assert pace.rate(8) == pytest.approx(rate, rel=0.2)
+
+
 @pytest.mark.parametrize(
     ("here", "reads", "turned"),
     [
