@@ -7,6 +7,7 @@ hops (`hopping.py`).
 
 from __future__ import annotations
 
+from math import inf
 from typing import cast
 
 from services.camera.device import Reading, Status
@@ -44,24 +45,34 @@ def rush(helm: Helm, reaches: tuple[float, float], now: float, *, zooms: bool) -
     first = _first(helm, other, ways[other], held, reaches[other]) if pace.known(level) else held
     beside = _along(helm, other, ways[other], first)
     now = (yield from helm.start(levels_of({lead: level * sign(way), other: beside * sign(ways[other])}))).received
+    shows = now + timing.usual
     end = helm.course.origin[lead] + sign(way) * (held * rates[lead] + pace.change(level) * pace.rate(level) / 2)
     if first < held:
         now = yield from wait(now + first - timing.usual)
         left = helm.way(other, now)
         beside = _along(helm, other, left, held - first, beside)
         now = (yield from helm.start(levels_of({lead: level * sign(way), other: beside * sign(left)}))).received
-    for early in (True, False):  # once soon, as long as the speed is not known, and once before the end
-        ends = helm.course.end_for(lead, end, now)
+    for early in (True, False):  # as soon as it shows how fast it is, where that is not known, and before the end
+        ends = min(helm.course.end_for(lead, end, now), _safe(helm, other, now))
         unsure = helm.course.model_doubt(lead, ends) / rates[lead]
         latest = ends - 2 * timing.usual - min(timing.tail, LATE_LOOK * timing.usual)
-        look = max(now, latest - unsure)
         if latest < now or (early and pace.known(level)):
             continue
-        yield from wait(min(look, now + timing.usual) if early else look)
+        yield from wait(min(latest, shows) if early else max(now, latest - unsure))
         reply = yield from helm.send(Status())
         now = reply.received
         helm.course.read(reply, cast(Reading, reply.result))
-    return (yield from wait(max(now, helm.course.end_for(lead, end, now) - timing.usual)))
+    ends = min(helm.course.end_for(lead, end, now), _safe(helm, other, now))
+    return (yield from wait(max(now, ends - timing.usual)))
+
+
+def _safe(helm: Helm, axis: int, now: float) -> float:
+    """Until when the axis beside may turn, as is known by now: later, a late answer lets it push against its stop."""
+    level, (low, high) = helm.course.levels[axis], helm.limits.ranges[axis]
+    if not level:
+        return inf
+    late = helm.skill.paces[axis].rate(abs(level)) * helm.skill.timing.tail
+    return helm.course.end_for(axis, high - late if level > 0 else low + late, now)
 
 
 def _top(pace: Pace) -> float:
