@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import cast
 
 from services.camera.device import Reading, Refused, Request, Status
@@ -61,7 +62,7 @@ def follow(helm: Helm, drive: own.Begun, *, certain: bool, proven: bool) -> Plan
     """Looks at the firmware's own move until it has ended; once on the way, where its speed is not known well.
 
     `certain`: it is known where that leads; `proven`: from experience. Returns the reading, when it rests, and whether
-    that surely shows the camera at rest.
+    that surely shows the camera at rest; otherwise it leaves open whether it moves, and may be of just before the end.
     """
     now, skill, way = drive.reply.received, helm.skill, drive.drive
     arrives = drive.arrives(skill)
@@ -82,4 +83,4 @@ def follow(helm: Helm, drive: own.Begun, *, certain: bool, proven: bool) -> Plan
         skill.ended(end.off)
     skill.lead_zoom(reading.zoom, way.to[ZOOM])
     helm.stand(reading)
-    return reading, now, rests
+    return (reading if rests else replace(reading, moving=None)), now, rests
