@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign, sqrt
 
 
@@ -54,6 +54,13 @@ class Glide:
         """When it begins to slow down for its goal."""
         pieces = self._pieces()
         return self.began + sum(seconds for seconds, _, _ in pieces[:-1]) if len(pieces) >= 3 else self.began
+
+    @property
+    def back(self) -> Glide:
+        """The part of it from where it turns round, and rests; all of it where it began at rest. No other has one."""
+        seconds, slows = abs(self.speed) / self.acceleration, self.speed * abs(self.speed) / (2 * self.acceleration)
+        began, answered = self.began + seconds, self.answered + seconds
+        return replace(self, began=began, place=self.place + slows, speed=0.0, answered=answered)
 
     def _pieces(self) -> list[tuple[float, float, float]]:
         """Seconds, the speed they begin with, and its change."""

@@ -51,7 +51,7 @@ class Hopping:
         self.turns = 0
         self.zooms = False  # whether zoom is to change
         self.glides: list[Glide] = []
-        self.zooming = Glide(0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0)  # zoom's since it last stood
+        self.zooming = Glide(0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0)  # zoom's since it last stood, or turned round
         self.hops: list[Hop] = []
         self.foretold = 0.0  # degrees: doubt of where the hops began, where that was foretold
 
@@ -107,7 +107,7 @@ class Hopping:
         if certain:
             known = landing.doubts(self.helm.skill, self.form, self.hops, self.foretold)
             rest = [landing.read(*one) for one in zip(self.helm.limits.pose(reading), known, strict=False)]
-            landing.stray(self._scale, self.glides, known, rest)
+            landing.stray(scale.strays(self._scale, self.hops), self.glides, known, rest)
         scale.learn(self.helm.skill, self.form, self.hops, to, self.helm.limits, reading)
 
     def _exact(self, to: Pose) -> bool:
@@ -130,7 +130,7 @@ class Hopping:
             zoom_drive.see(helm.skill, self.zooming, reply)
             arrives = max(self._ends(), self.glides[ZOOM].ends)
             ends = landing.ends(helm.skill, self.glides, doubts, reply, helm.limits.pose(reading))
-            landing.stray(self._scale, self.glides, doubts, ends)
+            landing.stray(scale.strays(self._scale, self.hops), self.glides, doubts, ends)
             if zoom_drive.comes(helm.skill, self.zooming, reading, helm.skill.seen_at(reply)):
                 reading = zoom_drive.at_end(helm.skill, self.zooming, reading)
             zoomed = abs(helm.goal.pose[ZOOM] - reading.zoom) <= helm.zoom_near or not self._takes_zoom()
@@ -194,7 +194,7 @@ class Hopping:
         parts = []
         for axis in (PAN, TILT):
             reach = min(most, self._reach(axis, there[ZOOM]))
-            short = SHORT * speeds[axis] * helm.skill.timing.spread if self._scale.share < KNOWN else 0.0
+            short = SHORT * speeds[axis] * helm.skill.timing.spread if self._scale.flying.share < KNOWN else 0.0
             way = min(reach, max(-reach, helm.aim[axis] - short - there[axis]))
             parts.append(helm.skill.senses[axis].sign * self._planes.part(axis, way, there[ZOOM]))
         right, down = (min(1.0, max(-1.0, part)) for part in parts)
@@ -236,8 +236,9 @@ class Hopping:
         self.hops.append(
             Hop(begun, (pan, tilt), (right, down, request.zoom), speeds, tops, turned, rested, zoomed, unsure, moment)
         )
-        if not zoomed:
-            self.zooming = self.glides[ZOOM]
+        zoom = self.glides[ZOOM]
+        goes_on = zoomed * (zoom.goal - zoom.place) > 0
+        self.zooming = replace(self.zooming, goal=zoom.goal) if goes_on else zoom.back
         helm.course.leave(begun)
 
     def _turned(self, acted: float, reply: Reply, late: float) -> tuple[Turned, Turned]:

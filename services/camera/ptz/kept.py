@@ -63,6 +63,7 @@ class _Kept(BaseModel):
     presets: dict[int, Triple]
     scales: dict[RelativeForm, dict[str, _Law]] = {}
     strayed: dict[RelativeForm, Pair] = {}
+    strayed_flying: dict[RelativeForm, Pair] = {}
 
 
 class Kept:
@@ -151,7 +152,8 @@ def _kept(identity: Identity, skill: Skill) -> _Kept:
             form: {one.law.name: _Law(likely=one.likely, **_kept_filter(one).model_dump()) for one in scale.laws}
             for form, scale in skill.scales.items()
         },
-        strayed={form: (scale.strayed, scale.looks) for form, scale in skill.scales.items()},
+        strayed={form: (scale.rested.square, scale.rested.looks) for form, scale in skill.scales.items()},
+        strayed_flying={form: (scale.flying.square, scale.flying.looks) for form, scale in skill.scales.items()},
     )
 
 
@@ -169,7 +171,8 @@ def _take_in(kept: _Kept, skill: Skill) -> None:
         *zip((*skill.paces, *skill.drives), (*kept.paces, *kept.drives), strict=True)
     ]
     for form, scale in skill.scales.items():
-        scale.strayed, scale.looks = kept.strayed.get(form, (scale.strayed, scale.looks))
+        for strays, seen in ((scale.rested, kept.strayed), (scale.flying, kept.strayed_flying)):
+            strays.square, strays.looks = seen.get(form, (strays.square, strays.looks))
         for planes in scale.laws:
             law = kept.scales.get(form, {}).get(planes.law.name)
             if law is not None:

@@ -20,7 +20,7 @@ from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, READ_LATE, READ_PART
-from services.camera.ptz.planes import Scale
+from services.camera.ptz.planes import Strays
 from services.camera.ptz.scale import Hop
 from services.camera.ptz.skill import NEAR_DEG, RelativeForm, Skill
 
@@ -96,7 +96,7 @@ class End:
 
 def doubts(skill: Skill, form: RelativeForm, hops: Sequence[Hop], place: float) -> tuple[Doubts, Doubts]:
     """Those of pan and tilt on the way of a chain of hops; `place`: of where it began, beside what the hops tell."""
-    share = skill.scales[form].share
+    share = scale.strays(skill.scales[form], hops).share
     time = _time(skill, skill.timing.spread / 2, share)
 
     def of(axis: int) -> Doubts:
@@ -127,11 +127,11 @@ def _lasts(skill: Skill, hop: Hop, axis: int, change: float) -> float:
     return hypot(change * min(top * pace.slow, sqrt(way * pace.slow)), fast * pace.doubt(pace.speeds[-1]) / top)
 
 
-def stray(scale: Scale, glides: Sequence[Glide], known: Sequence[Doubts], told: Sequence[End]) -> None:
+def stray(strays: Strays, glides: Sequence[Glide], known: Sequence[Doubts], told: Sequence[End]) -> None:
     """Takes in how far off a look shows pan and tilt, over how far they might be: so experience leaves less doubt."""
     for glide, doubts, end in zip(glides, known, told, strict=False):
         noise = hypot(doubts.read, sqrt(max(0.0, end.noise**2 - doubts.read**2)) / doubts.share)
-        scale.stray((end.seen - glide.goal) / hypot(end.before / doubts.share, noise))
+        strays.add((end.seen - glide.goal) / hypot(end.before / doubts.share, noise))
 
 
 def _time(skill: Skill, late: float, share: float) -> float:

@@ -23,6 +23,7 @@ AXES = 2
 FORGETS = 0.95  # what a law has foretold counts so much with each hop more
 UNLIKELY = 2.0  # a law that is not the first one, before anything was seen; a logarithm
 STRAYED, FIRST_LOOKS, MOST_LOOKS = 0.6, 8, 20  # a guess that counts as so many looks; more are not remembered
+FLYING_LOOKS = 4  # the same of hops in flight, of which there are fewer
 MARGIN, LEAST_SHARE = 1.25, 0.12  # experience leaves so much more doubt than it shows, and at least so much
 OUT = 3.0  # standard deviations: what is farther off tells no more against a law
 
@@ -123,27 +124,37 @@ class Planes:
 
 
 @dataclass
-class Scale:
-    """One form, by each law that it may follow; `off`: how far from where they should its hops end, over their way.
+class Strays:
+    """How far off looks showed hops, over how far off they may be by all that is learnt.
 
-    `strayed`: the mean square of how far off they were seen, over how far they may be by all that is learnt; `looks`:
-    of so many.
+    `square`: the mean of its square, and `looks`: of so many.
     """
 
-    laws: tuple[Planes, ...]
-    off: float = 0.0
-    strayed: float = STRAYED**2
+    square: float = STRAYED**2
     looks: float = FIRST_LOOKS
 
     @property
     def share(self) -> float:
         """Of all doubt about the end of hops, what experience leaves."""
-        return min(1.0, max(LEAST_SHARE, MARGIN * sqrt(self.strayed)))
+        return min(1.0, max(LEAST_SHARE, MARGIN * sqrt(self.square)))
 
-    def stray(self, off: float) -> None:
-        """A look showed hops so far off, over how far they may be by all that is learnt."""
+    def add(self, off: float) -> None:
+        """A look showed one so far off."""
         self.looks = min(MOST_LOOKS, self.looks + 1)
-        self.strayed += (min(1.0, off * off) - self.strayed) / self.looks
+        self.square += (min(1.0, off * off) - self.square) / self.looks
+
+
+@dataclass
+class Scale:
+    """One form, by each law that it may follow; `off`: how far from where they should its hops end, over their way.
+
+    `rested`, `flying`: what looks showed of hops that began at rest, and in flight: those begin less exactly.
+    """
+
+    laws: tuple[Planes, ...]
+    off: float = 0.0
+    rested: Strays = field(default_factory=Strays)
+    flying: Strays = field(default_factory=lambda: Strays(looks=FLYING_LOOKS))
 
     @property
     def planes(self) -> Planes:

@@ -12,7 +12,7 @@ from services.camera.device import Reading
 from services.camera.ptz.course import PAN, TILT, ZOOM
 from services.camera.ptz.goal import EDGE_DEG, Limits, Pose
 from services.camera.ptz.pace import HALF_CHANGE, Pace, Seen, Told, Vector
-from services.camera.ptz.planes import Planes, Scale
+from services.camera.ptz.planes import Planes, Scale, Strays
 from services.camera.ptz.skill import LEVEL, RelativeForm, Skill
 
 STAYED_DEG = 0.3
@@ -23,8 +23,8 @@ LEVELS = 0.5  # where zoom is while it turns, beside the doubt of its rate
 ZOOMED = 0.4  # of the doubt about where zoom was, for what a hop tells of the scale
 KNOWN = 0.08  # of zoom's rate: as well known as that, it is told more exactly by where hops led
 ROUGHLY = 0.2  # of a rate
-SHARE = 0.8  # of the way that the first hop of a chain went; less tells little of the motor before it
 TIMED = 0.5  # of the time that an axis takes to slow down: with less doubt it is known when it rests
+FLIES_DEG_S = 2.0  # a hop that begins so fast does so in flight
 ALIKE = 2.0  # what each of two takes from one reading, the other took too: so often more doubt is left to both
 
 
@@ -104,6 +104,12 @@ def _see_zoom(skill: Skill, form: RelativeForm, begun: float, to: float, reading
         skill.honours[zooms(form)] = "no"
 
 
+def strays(scale: Scale, hops: Sequence[Hop]) -> Strays:
+    """What experience tells of a chain, by how its last hop began."""
+    flies = max(map(abs, hops[-1].speeds[:ZOOM])) > FLIES_DEG_S
+    return scale.flying if flies else scale.rested
+
+
 def unsure(scale: Scale, hops: Sequence[Hop]) -> float:
     """How far from where it should the end of a chain may be, degrees: one standard deviation."""
     return max(hypot(*doubts(scale, hops, axis)) for axis in (PAN, TILT))
@@ -145,9 +151,9 @@ def _learn(skill: Skill, form: RelativeForm, axis: int, hops: Sequence[Hop], wro
         told = _told(planes, axis, hops, read)
         planes.learn(told.slope, wrong - told.beside, hypot(told.noise, told.before, ZOOMED * told.zoomed))
         pace = skill.paces[axis]
-        if planes is believed and turned is not None and told.share > SHARE and _roughly(pace, turned[axis].told):
-            travel = hops[0].begun[axis] + wrong / told.share - turned[axis].origin
-            noise = ALIKE * hypot(told.noise, told.doubt, told.zoomed) / told.share
+        if planes is believed and turned is not None and _roughly(pace, turned[axis].told):
+            travel = hops[0].begun[axis] + wrong - turned[axis].origin
+            noise = ALIKE * hypot(told.noise, told.doubt, told.zoomed)
             seen = Seen(turned[axis].answered, turned[axis].late, travel, noise, acts=True)
             pace.learn(turned[axis].told, seen)
         drive = skill.drive(ZOOM)
@@ -166,15 +172,14 @@ def _roughly(pace: Pace, told: Sequence[Told]) -> bool:
 class _Told:
     """What the end of a chain tells of a law: how that changes with the law's numbers, and its noise.
 
-    `doubt`: that of the law; `share`: how much of where the first hop began is left in it; `before`: what doubt of
-    that is; `beside`: how far from what was believed the law would have ended. `zoom`: how it changes with zoom's
-    rate, and `zoomed`: what the doubt about where zoom was then makes of it.
+    `doubt`: that of the law; `before`: that of where the first hop began, which is left in it whatever came then;
+    `beside`: how far from what was believed the law would have ended. `zoom`: how it changes with zoom's rate, and
+    `zoomed`: what the doubt about where zoom was then makes of it.
     """
 
     slope: Vector
     doubt: float
     noise: float
-    share: float
     before: float
     beside: float
     zoom: float
@@ -200,5 +205,5 @@ def _told(planes: Planes, axis: int, hops: Sequence[Hop], read: float) -> _Told:
             noise = hypot(noise, LEVELS * grows)
             zoom, zoomed = zoom - hop.zoomed * grows, zoomed + hop.unsure * grows
         counts *= max(0.0, 1.0 - abs(hop.speeds[axis]) / hop.tops[axis])  # in full flight it matters not where to
-    before = 0.0 if hops[0].turned is None else ALIKE * share * hops[0].turned[axis].doubt
-    return _Told(slope, planes.doubt(slope), noise, share, before, beside, zoom, abs(zoomed))
+    before = 0.0 if hops[0].turned is None else ALIKE * hops[0].turned[axis].doubt
+    return _Told(slope, planes.doubt(slope), noise, before, beside, zoom, abs(zoomed))

@@ -15,7 +15,8 @@ from services.camera.ptz.glide import Glide
 from services.camera.ptz.pace import READ_LATE, READ_PART, Seen, Told
 from services.camera.ptz.skill import Skill
 
-SLOWER = 0.01  # it may last longer than that, for all that is known
+SLOWER = 0.003  # of what fits all looks lasts longer than is waited for
+LATER, LATER_S = 1.5, 0.01  # standard deviations of the moment that its looks told of; at most
 SURE = 0.4  # of its rate may be in doubt
 UNREAD_LEVELS = 0.6  # where it is told in coarse steps
 AHEAD_LEVELS, KNOWN = 1.4, 0.03  # where it is known how fast it is: so that no more of its rate is in doubt
@@ -78,9 +79,12 @@ def sure(skill: Skill, glide: Glide, now: float) -> bool:
 
 
 def rests(skill: Skill, glide: Glide) -> float:
-    """When it rests at the latest, as far as its speed is known by now."""
-    way = abs(glide.goal - glide.place)
-    return glide.began + (skill.zoom_rate.lasts(way, SLOWER) if way else 0.0)
+    """When it rests at the latest, as far as its speed is known by now; it began at the latest when that was answered.
+
+    All looks may have told of a later moment than is thought: then it takes twice as much longer to get to its speed.
+    """
+    way, later = abs(glide.goal - glide.place), 2 * LATER * min(LATER_S, skill.paces[PAN].other_doubt(READ_LATE))
+    return max(glide.began, glide.answered) + skill.zoom_rate.lasts(way, SLOWER) + later if way else glide.began
 
 
 def shown(skill: Skill, glide: Glide, sent: float, since: float) -> bool:

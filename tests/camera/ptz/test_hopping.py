@@ -22,7 +22,7 @@ from services.camera.ptz.skill import RelativeForm, Skill
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.track import Moment, Rail, go
 from tests import bounds
-from tests.camera.goals import Rig, random_goals
+from tests.camera.goals import Rig, random_goals, with_other_motors
 from tests.camera.motors import Motors, drive
 
 LIMITS = Limits()
@@ -57,6 +57,15 @@ def test_when_so_much_of_its_way_is_left_is_told_of_all_its_way(turn: int, speed
     assert turns <= glide.brakes <= glide.ends
     still = Glide(5.0, 10.0, 0.0, 10.0, 45.0, 120.0, 0.0)
     assert still.within(0.1) == 5.0
+
+
+@pytest.mark.parametrize("speed", [-30.0, -2.0, 0.0, 45.0])
+def test_where_it_turns_round_it_rests_and_goes_on_from_there_as_from_any_rest(speed: float) -> None:
+    glide = Glide(5.0, 10.0, speed, 12.0, 45.0, 120.0, 5.1)
+    back = glide.back
+    assert glide.at(back.began) == (pytest.approx(back.place), pytest.approx(0.0))
+    assert back.ends == pytest.approx(glide.ends)
+    assert back.answered - back.began == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("mirror", [True, False])
@@ -263,3 +272,20 @@ def test_an_axis_that_changed_its_speed_is_not_pushed_against_its_stop_where_ans
         changed += sum(isinstance(request, Start) for request in motors.sent) > 1
     assert changed >= 3
     assert not motors.pushed
+
+
+def test_the_first_look_after_a_start_at_full_speed_is_late_enough_to_show_how_fast_that_is() -> None:
+    looks: list[float] = []
+    for seed in range(2, 60, 2):
+        rig, sent = Rig(with_other_motors(PROFILES["ip2m-841b-strict"], seed), seed), list[Reply]()
+        rig.visit(random_goals(1, seed))
+        rig.log = sent.append
+        rig.visit(random_goals(4, seed)[1:])
+        looks += [
+            look.sent - start.received
+            for start, look, then in zip(sent, sent[1:], sent[2:], strict=False)
+            if isinstance(start.request, Start) and start.request.speed == 8 and isinstance(look.request, Status)
+            if then.sent > start.received + 1.2  # there is time for it
+        ]
+    assert len(looks) > 5
+    assert min(looks) > 0.1

@@ -10,8 +10,8 @@ import pytest
 from services.camera.device import Reading, Reply, Status
 from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Pose
-from services.camera.ptz.landing import Doubts, End, at_end, doubts, ends, foretell, judge, read, sight
-from services.camera.ptz.scale import Hop
+from services.camera.ptz.landing import Doubts, End, at_end, doubts, ends, foretell, judge, read, sight, stray
+from services.camera.ptz.scale import Hop, Turned, strays
 from services.camera.ptz.skill import Skill
 
 WAY = Glide(began=0.0, place=10.0, speed=0.0, goal=40.0, top=45.0, acceleration=90.0, answered=0.0)
@@ -89,6 +89,35 @@ def test_the_later_than_usual_a_hop_acted_the_less_is_known_of_where_it_began_an
     assert usual[0].place == late[0].place == 0.0  # at rest it is the same whenever it acts
     assert late[1].place > usual[1].place + 0.5
     assert late[1].goal == pytest.approx(usual[1].goal)
+
+
+def test_however_fast_a_hop_takes_the_place_of_another_it_ends_as_far_off_as_the_first_one_began() -> None:
+    """All of them go on from where the camera is, and that is beside where it is thought to be by as much."""
+    skill, still = Skill(), (0.0, 0.0, 0.0)
+    turned = Turned((), 0.0, 20.0, 0.0, 0.0)
+    first = Hop(still, (0.1, 0.0), (18.0, 0.0, 0.0), (45.0, 0.0, 0.0), (45.0, 27.0, 4.0), (turned, turned), 0.0)
+    known = [
+        doubts(skill, "moveRelatively", [first, replace(first, speeds=(speed, 0.0, 0.0), turned=None)], 0.0)[0]
+        for speed in (5.0, 25.0, 44.0)
+    ]
+    assert all(one.place >= one.share * turned.doubt for one in known)
+
+
+def test_what_hops_from_rest_showed_says_nothing_of_those_that_begin_in_flight() -> None:
+    skill, still = Skill(), (0.0, 0.0, 0.0)
+    rest = Hop(still, (0.1, 0.0), (18.0, 0.0, 0.0), still, (45.0, 27.0, 4.0), None, 1.0)
+    flight = replace(rest, speeds=(0.0, -8.0, 0.0))
+
+    def shares() -> list[float]:
+        return [doubts(skill, "moveRelatively", [hop], 0.0)[0].share for hop in (rest, flight)]
+
+    before = shares()
+    exact = [End(20.0, 0.1, 0.2, 20.0, 0.06)] * 2
+    for _ in range(20):
+        stray(strays(skill.scales["moveRelatively"], [rest]), (replace(WAY, goal=20.0),) * 2, (KNOWN, KNOWN), exact)
+    after = shares()
+    assert after[0] < before[0] / 2
+    assert after[1] == before[1]
 
 
 def test_a_short_hop_is_looked_at_before_it_brakes_but_not_before_that_shows_whether_it_goes() -> None:

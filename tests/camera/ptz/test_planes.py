@@ -11,7 +11,7 @@ import pytest
 
 from services.camera.device import Identity
 from services.camera.ptz.kept import Kept
-from services.camera.ptz.planes import LEVELS, POINT, TURN, Planes
+from services.camera.ptz.planes import LEVELS, POINT, TURN, Planes, Strays
 from services.camera.ptz.skill import Skill
 from services.simulators.camera.firmwares import PROFILES
 from services.simulators.camera.latency import TAIL
@@ -74,7 +74,8 @@ def test_what_was_learnt_of_it_is_kept(tmp_path: Path) -> None:
     point, _, turn = skill.scales["Position"].laws
     seen(point, 0, 0.0, 1.3)
     turn.likely = 5.0
-    skill.scales["Position"].stray(0.1)
+    skill.scales["Position"].rested.add(0.1)
+    skill.scales["Position"].flying.add(0.2)
     kept = Kept(tmp_path, "ip1")
     kept.recall(identity, skill)
     kept.save(skill)
@@ -84,20 +85,22 @@ def test_what_was_learnt_of_it_is_kept(tmp_path: Path) -> None:
     assert known.at(4.0) == pytest.approx(point.at(4.0))
     assert known.doubt(known.weights(0, 0.0)) < 0.1
     assert again.scales["Position"].planes.law is TURN
-    assert again.scales["Position"].share == skill.scales["Position"].share != Skill().scales["Position"].share
+    shares = [(scale.rested.share, scale.flying.share) for scale in (one.scales["Position"] for one in (again, skill))]
+    assert shares[0] == shares[1]
+    assert len({*shares[0], Skill().scales["Position"].rested.share}) == 3
 
 
 def test_where_hops_end_as_reckoned_experience_leaves_little_doubt_until_one_strays() -> None:
-    scale = Skill().scales["Position"]
-    first = scale.share
+    strays = Strays()
+    first = strays.share
     for _ in range(60):
-        scale.stray(0.1)
-    assert 0.1 < scale.share < 0.2 < first
-    scale.stray(3.0)
-    assert scale.share > 0.2
+        strays.add(0.1)
+    assert 0.1 < strays.share < 0.2 < first
+    strays.add(3.0)
+    assert strays.share > 0.2
     for _ in range(40):
-        scale.stray(2.0)
-    assert scale.share == 1.0  # there is no more doubt than all that is learnt leaves
+        strays.add(2.0)
+    assert strays.share == 1.0  # there is no more doubt than all that is learnt leaves
 
 
 @pytest.mark.parametrize("late", range(2, 7))

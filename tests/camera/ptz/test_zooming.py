@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
+
 from services.camera.device import Reply, Request, Start, Status, Stop
+from services.camera.ptz import zoom_drive
+from services.camera.ptz.course import PAN
+from services.camera.ptz.glide import Glide
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.move import goto
 from services.camera.ptz.skill import Skill
+from services.camera.ptz.zoom_rate import ZoomRate
 from services.camera.ptz.zooming import widest
 from services.simulators.camera.firmwares import PROFILES
 from tests.camera.goals import Rig
@@ -65,3 +73,24 @@ def test_zoom_that_a_late_answer_let_go_too_far_is_put_right_without_a_look() ->
         assert outcome.error is None
         assert outcome.off_zoom <= 1.0
         assert asked == ([Start, Stop, Start, Stop, Status] if late else [Start, Stop, Status])
+
+
+def test_zoom_that_may_have_begun_as_late_as_it_was_answered_may_rest_as_late() -> None:
+    skill, soon = Skill(zoom_rate=ZoomRate(4.0, 0.01)), Glide(100.0, 0.0, 0.0, 4.0, 4.0, 40.0, 100.0)
+    late, still = replace(soon, answered=100.2), replace(soon, goal=0.0, answered=100.2)
+    assert zoom_drive.rests(skill, late) == pytest.approx(zoom_drive.rests(skill, soon) + 0.2)
+    assert zoom_drive.rests(skill, still) == 100.0  # it does not turn
+
+
+@pytest.mark.parametrize("late", [-0.02, 0.0, 0.02])
+def test_how_late_zoom_rests_is_said_of_looks_that_all_told_of_another_moment_too(late: float) -> None:
+    """They show a motor that is as fast, and takes less time to be so."""
+    skill, rate, slows = Skill(), 5.0, 0.14
+    glide = Glide(0.0, 0.0, 0.0, 8.0, rate, rate / slows, 0.0)
+    skill.paces[PAN].cov[-3, -3] = 0.009**2  # of the age of its readings
+    for sweep in range(15):
+        for step in range(1, 8, 2):
+            before = sweep % 2  # it is read to enter a step
+            when = step / rate + slows / 2 - 0.004 * before
+            skill.zoom_rate.see(when - late, step - 2 * before, step + 2 - 2 * before)
+    assert zoom_drive.rests(skill, glide) > 8.0 / rate + slows
