@@ -210,6 +210,12 @@ class Helm:
         timing, rate = self.skill.timing, self.skill.paces[axis].rate(abs(self.course.levels[axis]))
         return (left - LATE_PART * timing.tail * rate) / timing.usual
 
+    def safe(self, axis: int, rate: float, now: float) -> float:
+        """Until when an axis that turns may go on, as is known by now: later, a late answer lets it push."""
+        low, high = self.limits.ranges[axis]
+        before = rate * self.skill.timing.tail
+        return self.course.end_for(axis, high - before if self.course.levels[axis] > 0 else low + before, now)
+
     def _fastest(self, axis: int) -> float:
         """The highest speed that an axis was told since it last stood."""
         told, pace = self.course.told[axis], self.skill.paces[axis]

@@ -67,12 +67,9 @@ def rush(helm: Helm, reaches: tuple[float, float], now: float, *, zooms: bool) -
 
 
 def _safe(helm: Helm, axis: int, now: float) -> float:
-    """Until when the axis beside may turn, as is known by now: later, a late answer lets it push against its stop."""
-    level, (low, high) = helm.course.levels[axis], helm.limits.ranges[axis]
-    if not level:
-        return inf
-    late = helm.skill.paces[axis].rate(abs(level)) * helm.skill.timing.tail
-    return helm.course.end_for(axis, high - late if level > 0 else low + late, now)
+    """Until when the axis beside may turn."""
+    level = abs(helm.course.levels[axis])
+    return helm.safe(axis, helm.skill.paces[axis].rate(level), now) if level else inf
 
 
 def _top(pace: Pace) -> float:

@@ -186,17 +186,10 @@ class Turning:
         goal = self.helm.aim[axis] + leg.parts[axis].off * sign(self.helm.course.levels[axis])
         return self.helm.course.end_for(axis, goal, now)
 
-    def _safe(self, axis: int, rate: float, now: float) -> float:
-        """Until when an axis may wait for the other's end: later, a late answer lets it push against its stop."""
-        low, high = self.helm.limits.ranges[axis]
-        before = rate * self.helm.skill.timing.tail
-        stop = high - before if self.helm.course.levels[axis] > 0 else low + before
-        return self.helm.course.end_for(axis, stop, now)
-
     def _surely(self, axis: int, now: float) -> float:
         """The same where it is farther than is reckoned; of more doubt than is usual a look is to tell."""
         rate = self._rate(axis)
-        ends = self._safe(axis, rate, now)
+        ends = self.helm.safe(axis, rate, now)
         return ends - min(FARTHER_DEG, self.helm.course.doubt(axis, ends)) / rate
 
     def _looks_until(self, leg: Leg, left: dict[int, int], now: float) -> float:
@@ -231,10 +224,12 @@ class Turning:
             rates = {axis: self.helm.skill.paces[axis].rate(leg.parts[axis].speed) for axis in left}
             if leg.joint:
                 together = sum(ends[axis] * rates[axis] for axis in left) / sum(rates.values())
-                send = min([together, *(max(ends[axis], self._safe(axis, rates[axis], now)) for axis in left)]) - usual
+                send = (
+                    min([together, *(max(ends[axis], self.helm.safe(axis, rates[axis], now)) for axis in left)]) - usual
+                )
             else:
                 send = min(ends.values()) - usual
-            send = min([send, *(self._safe(axis, self._rate(axis), now) - usual for axis in self._along(left))])
+            send = min([send, *(self.helm.safe(axis, self._rate(axis), now) - usual for axis in self._along(left))])
             blind, until = self.helm.course.unseen(now) + BLIND_S, self._looks_until(leg, left, now)
             risky, soon = self._risky(send + usual), send <= blind
             sure = not risky and all(self.helm.skill.paces[axis].known(leg.parts[axis].speed) for axis in left)
