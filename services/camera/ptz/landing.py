@@ -27,7 +27,7 @@ from services.camera.ptz.skill import NEAR_DEG, RelativeForm, Skill
 # When to look.
 LEFT_DEG = (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1)  # of the way, the most that tells enough
 EXPECTED_DOUBT_DEG = 0.15  # a look tells enough that should leave no more doubt than this
-EXPECTED_NOISE_DEG = 0.3  # and whose own noise is no more
+EXPECTED_NOISE_DEG = 0.4  # and whose own noise is no more
 STAYS_DEG = 0.3  # an axis that should go farther has to be seen on its way
 LATER = 0.1  # of the spread of answers: so much later, since a quick one is before its time
 
