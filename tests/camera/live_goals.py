@@ -40,7 +40,7 @@ COLD = ("ip3m-941w-2019", "ip4m-1051b-2019", "ip2m-841b-strict", "ip4m-1041b")  
 AT_ONCE = 2
 PAUSE_S = (0.3, 4.0)  # between two orders: people do not wait for the service's rhythm
 LIMIT_S = 90.0
-CALIBRATES_S = 400.0  # at most
+CALIBRATES_S = 500.0  # at most
 SUBSTREAM = "ExtraFormat"  # the one that the service hands on
 
 

@@ -61,7 +61,7 @@ def calibrate(limits: Limits, skill: Skill) -> Plan[Arrival]:
     for goal in islice(places, FIRST_PLACES):
         now = (yield from goto(goal, limits, skill, now + MOVE_S)).at
     now = yield from sweep(limits, skill)
-    if any(skill.honours.get(form) == "yes" for form in skill.scales):
+    if skill.hops:
         for goal in places:
             now = (yield from goto(goal, limits, skill, now + MOVE_S)).at
     return (yield from goto(began, limits, skill, now + MOVE_S))

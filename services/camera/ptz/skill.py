@@ -180,6 +180,11 @@ class Skill:
                 self.zoom_rate = ZoomRate(told.rate(top), part)
         return own
 
+    @property
+    def hops(self) -> bool:
+        """Whether the firmware is known to go on by parts of the picture."""
+        return any(self.honours.get(form) == "yes" for form in self.scales)
+
     def least(self, axis: int) -> float:
         """The smallest step: a start, and its end as soon as it was answered."""
         return self.paces[axis].rate(1) * self.timing.usual

@@ -23,6 +23,7 @@ from services.camera.ptz.stand import settle, stop
 from services.camera.ptz.zoom_rate import ZoomRate
 
 SWEEPS = 15  # from end to end
+MORE_SWEEPS = 36  # where hops begin while zoom turns: how far they go depends on where it is then
 LOOKS = 20  # at one of them
 LEAST_DOUBT, DOUBTS = 0.05, 3.0  # of its rate before the first look, at least; times what was doubted before
 SPARE = 1.2  # of a way by the relative form, so that the end is met exactly
@@ -33,7 +34,7 @@ def sweep(limits: Limits, skill: Skill) -> Plan[float]:
     own = not isinstance(_request(limits, skill, (0.0, 0.0, limits.zoom[0]), limits.zoom[1]), Start)
     pace = skill.drive(ZOOM) if own else skill.paces[ZOOM]
     known = ZoomRate(pace.rate(1), max(LEAST_DOUBT, DOUBTS * pace.doubt(1) / pace.rate(1)))
-    for number in range(1 + SWEEPS):  # the first one begins anywhere
+    for number in range(1 + (MORE_SWEEPS if skill.hops else SWEEPS)):  # the first one begins anywhere
         now, there = yield from _once(limits, skill, known, limits.zoom[number % 2])
         if not there:
             return now

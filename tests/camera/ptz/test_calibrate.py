@@ -10,7 +10,9 @@ from services.camera.ptz.calibrate import calibrate
 from services.camera.ptz.goal import Limits
 from services.camera.ptz.kept import recalled
 from services.camera.ptz.skill import Skill
+from services.simulators.camera.firmwares import PROFILES
 from tests.camera.flat import Flat
+from tests.camera.goals import Rig
 from tests.camera.motors import PAN, Motors, drive
 
 
@@ -50,13 +52,21 @@ def test_it_is_not_begun_by_a_no(flat: Flat) -> None:
 def test_parts_of_the_picture_are_known_at_every_zoom_afterwards_where_the_firmware_goes_by_them() -> None:
     motors, skill, limits = Motors(relative="picture", acceleration=120.0), Skill(), Limits()
     skill.forget_senses(flip=True, mirror=True)
-    run, _ = drive(calibrate(limits, skill), motors, limit_s=300.0)
+    run, _ = drive(calibrate(limits, skill), motors, limit_s=420.0)
     assert run.error is None
     assert skill.honours["Position"] == "yes"
     planes = skill.scales["Position"].planes
     doubts = [planes.doubt(planes.weights(axis, zoom)) for axis in (0, 1) for zoom in (0.0, 4.0, 8.0)]
     assert max(doubts) < 0.1  # of the part; 0.5 before
     assert motors.pushed == 0.0
+
+
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_there_zoom_is_known_to_a_hundredth_for_how_far_a_hop_goes_depends_on_where_it_is(seed: int) -> None:
+    profile = PROFILES["ip2m-841b-strict"]
+    rig = Rig(profile, seed)
+    rig.calibrate()
+    assert rig.skill.drive(2).rate(1) == pytest.approx(profile.zoom_speed, rel=0.01)
 
 
 @pytest.mark.parametrize(("rate", "grid"), [(2.0, 2.0), (5.0, 2.0), (4.0, 1.0)])
