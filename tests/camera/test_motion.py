@@ -196,6 +196,35 @@ def test_after_a_reconnect_the_camera_is_asked_whether_motion_is_going_on() -> N
     assert room.values == [0, 1]
 
 
+def test_a_reconnect_while_the_camera_turns_is_asked_about_when_the_picture_has_settled() -> None:
+    room = Room().attached()
+    asked = list(room.asked)
+    room.goes_on, room.turning = True, True
+    room.run(1)
+    room.hear(lost="the connection broke")
+    room.hear(attached=True)
+    room.run(5)
+    assert room.asked == asked
+    room.turning = False
+    stood = room.now
+    room.goes_on = False
+    room.run(5)
+    assert room.asked == [*asked, stood + 2.0]
+    assert room.values == [0]
+
+
+def test_a_stop_that_was_lost_is_asked_about_when_the_camera_stands() -> None:
+    room = Room().attached()
+    room.hear(START)
+    room.turning = True
+    asked = list(room.asked)
+    room.run(20, [BEAT])
+    assert (room.asked, room.values) == (asked, [0, 1])
+    room.turning = False
+    room.run(3, [BEAT])
+    assert (len(room.asked), room.values) == (len(asked) + 1, [0, 1, 0])
+
+
 def test_a_short_break_is_no_trouble_and_a_longer_one_is() -> None:
     room = Room().attached()
     room.hear(lost="the connection broke")

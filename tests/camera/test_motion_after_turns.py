@@ -32,7 +32,10 @@ def world() -> World:
 
 
 class Hall:
-    """One camera, what hears its motion, and a clock that jumps. `refuses`: what fails of what is asked."""
+    """One camera, what hears its motion, and a clock that jumps. `refuses`: what fails of what is asked.
+
+    Without `answers` the camera takes its time for them.
+    """
 
     def __init__(self, world: World, *, dither_s: int = 5, beats: bool = True) -> None:
         self.now = 1000.0
@@ -40,6 +43,7 @@ class Hall:
         self.device.tables.write([(TABLE, str(dither_s))])
         self.refuses: Callable[[str], DeviceError | None] = lambda target: None
         self.loses_stops = False
+        self.answers = True
         self.targets: list[str] = []
         self.said: list[tuple[float, int]] = []
         self.waiting: list[tuple[Request, int]] = []
@@ -87,7 +91,7 @@ class Hall:
             if event.action == "Start" or not self.loses_stops:
                 self.watch.take(Heard(self.now, (event,)))
         self._tick()
-        while self.waiting:
+        while self.waiting and self.answers:
             request, ticket = self.waiting.pop()
             assert isinstance(request, Errand)
             result, error = self._answer(request)
@@ -265,3 +269,20 @@ def test_how_long_the_camera_holds_motion_is_in_the_table_of_the_motion_detectio
         dialogue = errands.dialogue(GetMotionHold(code))
         with pytest.raises(Refused):
             next(dialogue), dialogue.send(body)
+
+
+def test_a_question_that_an_order_overtakes_is_not_followed_by_another_while_the_camera_turns(world: World) -> None:
+    hall = Hall(world, beats=False)
+    hall.answers = False
+    while not hall.waiting:
+        hall.step()
+    hall.go(300.0)
+    hall.run(1.0)
+    hall.targets.clear()
+    hall.answers = True
+    while hall.turning:
+        hall.step()
+    assert len(hall.targets) == 1
+    hall.run(30.0)
+    assert len(hall.targets) > 2
+    assert hall.values == [0]

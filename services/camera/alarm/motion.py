@@ -1,6 +1,7 @@
 """What the camera's events mean: 1 for a while after motion, -1 when the alarm is in trouble. Pure.
 
-    attached ──> the camera is asked whether motion is going on
+    attached ──> the camera is asked whether motion is going on; like every question not while the camera itself turns
+                 or has just turned
     Start    ──> 1, unless the camera itself turns or has just turned: then everything in its picture moves
     such a Start without a Stop ──> the camera is asked when it cannot be its turn any more: while it holds a motion
                  (anti-dither) it tells no new one, and somebody may have come in meanwhile
@@ -126,7 +127,7 @@ class MotionWatch:
                 self._active, self._moved_at = False, at
         elif event.action in ("Start", "Pulse"):
             lasting = event.action == "Start"
-            if at - self._turned_at >= MASK_S:
+            if self._settled(at):
                 self._moves(at, lasting=lasting)
                 return
             self.masked += 1
@@ -135,6 +136,9 @@ class MotionWatch:
 
     def _moves(self, at: float, *, lasting: bool) -> None:
         self._active, self._moved_at = lasting, at
+
+    def _settled(self, at: float) -> bool:
+        return at - self._turned_at >= MASK_S
 
     def _its_own(self, at: float, held_s: float) -> bool:
         """Whether what goes on may be the camera's own last turn, if it holds a motion so long."""
@@ -151,8 +155,10 @@ class MotionWatch:
             self._trouble_at = heard.at + (GRACE_S if was and not heard.silent else 0.0)
 
     def _wants_to_ask(self, now: float) -> bool:
-        if self._mute:  # while the camera turns an answer would count for nothing
-            return now - self._asked_at >= ASK_S and now - self._turned_at >= MASK_S
+        if not self._settled(now):  # an answer would count for nothing, and the motors' requests come first
+            return False
+        if self._mute:
+            return now - self._asked_at >= ASK_S
         if not self._attached:
             return False
         if self._asked_at == NEVER:
@@ -168,14 +174,21 @@ class MotionWatch:
                 break
         if reply.result and not self._active and self._its_own(reply.received, MOST_HOLD_S):
             self._unsure.add(code)
-            held = yield from attempt(GetMotionHold(code))
-            if held.error is None:
-                self._held_s = cast(float, held.result)
-            elif isinstance(held.error, Refused):
-                self._held_s = MOST_HOLD_S
-            else:
-                reply = held
+            if self._settled(reply.received):  # else an order came meanwhile: it is asked again when the camera stands
+                held = yield from self._learn_hold(code)
+                reply = reply if held is None else held
         self._told(reply)
+
+    def _learn_hold(self, code: str) -> Plan[Reply | None]:
+        """How long the camera holds a motion; what went wrong where it gave no answer."""
+        held = yield from attempt(GetMotionHold(code))
+        if held.error is None:
+            self._held_s = cast(float, held.result)
+        elif isinstance(held.error, Refused):
+            self._held_s = MOST_HOLD_S
+        else:
+            return held
+        return None
 
     def _told(self, reply: Reply) -> None:
         self._asking = False
