@@ -225,6 +225,20 @@ def test_a_stop_that_was_lost_is_asked_about_when_the_camera_stands() -> None:
     assert (len(room.asked), room.values) == (len(asked) + 1, [0, 1, 0])
 
 
+def test_a_service_that_starts_in_the_middle_of_a_turn_says_at_once_what_it_takes_for_true() -> None:
+    room = Room()
+    room.turning = True
+    room.run(1)
+    room.goes_on = True  # the turn itself, in all likelihood
+    room.hear(attached=True)
+    assert (len(room.asked), room.values) == (1, [0])
+    room.run(20, [BEAT])
+    assert (len(room.asked), room.values) == (1, [0])
+    room.turning, room.goes_on = False, False
+    room.run(12, [BEAT])  # longer than the camera would hold its own turn
+    assert (len(room.asked), room.values) == (2, [0])
+
+
 def test_a_short_break_is_no_trouble_and_a_longer_one_is() -> None:
     room = Room().attached()
     room.hear(lost="the connection broke")

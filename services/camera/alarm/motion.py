@@ -1,7 +1,7 @@
 """What the camera's events mean: 1 for a while after motion, -1 when the alarm is in trouble. Pure.
 
-    attached ──> the camera is asked whether motion is going on; like every question not while the camera itself turns
-                 or has just turned
+    attached ──> the camera is asked whether motion is going on; like every question, but for the very first, not while
+                 the camera itself turns or has just turned
     Start    ──> 1, unless the camera itself turns or has just turned: then everything in its picture moves
     such a Start without a Stop ──> the camera is asked when it cannot be its turn any more: while it holds a motion
                  (anti-dither) it tells no new one, and somebody may have come in meanwhile
@@ -155,7 +155,7 @@ class MotionWatch:
             self._trouble_at = heard.at + (GRACE_S if was and not heard.silent else 0.0)
 
     def _wants_to_ask(self, now: float) -> bool:
-        if not self._settled(now):  # an answer would count for nothing, and the motors' requests come first
+        if self._said is not None and not self._settled(now):  # an answer would hardly count, the motors come first
             return False
         if self._mute:
             return now - self._asked_at >= ASK_S
