@@ -18,7 +18,7 @@ from services.camera.ptz.pace import Pace
 from services.camera.ptz.skill import AGAIN_PART
 
 FEARED = 1.0  # of the doubt about a rate, where a stop is near
-MOST_HOPS = 4  # are left, although zoom has to wait for them
+MOST_HOPS = 3  # are left, although zoom has to wait for them: more of them cost commands and win no time
 BULK = 1.5  # answers: one that is shorter is not worth it
 SHARES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of it, the axis beside may have its first speed; then another one,
 FARTHER = 0.6  # where that leads it so much farther, of what a hop reaches
